@@ -1,0 +1,355 @@
+//! One haptic step: handle pose in, wrench out. Deterministic, no I/O, no allocation, no lock.
+//!
+//! The step is a list of stages (see [`Stage`]), repeated until the contact planes stand still:
+//! proximity, planes, Delassus operator, LCP, update. The tool sits in the same problem as the
+//! part: its virtual coupling is one more compliance (methods: `W = H_d C H_dᵀ + H_t K_c⁻¹ H_tᵀ`),
+//! so tool pose and contact forces come out of one LCP, at equilibrium.
+//!
+//! Everything here is in the part's frame; the session converts from and to the world.
+
+mod part;
+mod report;
+mod scratch;
+mod watch_list;
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use contact::delassus::{CouplingCompliance, delassus_into};
+use contact::lcp;
+use contact::plane::{planes_into, wrench_on_tool};
+use contact::tool::Tool;
+use device::VirtualCoupling;
+use glam::DVec3;
+use glamx::DPose3;
+
+pub use part::ContactPart;
+pub use report::{ActiveContact, N_STAGES, Stage, StepReport};
+use scratch::Scratch;
+use watch_list::WatchList;
+
+/// How often the contact planes are drawn anew within one step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ContactIterations {
+    /// Until the displacement of every near node changes by less than
+    /// [`EngineSettings::displacement_tolerance`].
+    Converged,
+    /// This many passes; 1 is the single pass of the paper.
+    Fixed(u32),
+}
+
+/// What a step is allowed and asked to do.
+#[derive(Clone, Debug)]
+pub struct EngineSettings {
+    /// Passes over the contact planes in a step.
+    pub contact_iterations: ContactIterations,
+    /// m. With [`ContactIterations::Converged`], the change of displacement and tool position
+    /// below which the planes stand still. 1e-9 m is 1e-5 N on a part of 10 kN/m.
+    pub displacement_tolerance: f64,
+    /// m. Nodes nearer to the tool than this get a plane. Does not change a converged result:
+    /// a node that comes in from farther away gets its plane in the next pass.
+    pub near_distance: f64,
+    /// Rows of the LCP that memory is reserved for; beyond it the deepest gaps are kept.
+    pub max_contacts: usize,
+    /// Settings of the LCP solver.
+    pub lcp: lcp::Settings,
+    /// m. Tool motion in one go; a faster handle is followed in several strides of the same step,
+    /// so that a jump cannot pick another branch or pass through the part unseen.
+    pub max_stride: f64,
+}
+
+/// Passes after which [`ContactIterations::Converged`] gives up and says so in the report.
+/// Nearby states need 3 to 7; more than 60 means that two sets of planes alternate.
+const MAX_PASSES: u32 = 60;
+
+/// Slack of the watch list over the distance at which nodes get a plane: long enough to be kept for
+/// tens of steps of a hand, short enough that few nodes are evaluated in vain.
+const WATCH_SLACK: f64 = 3.0;
+
+/// Strides in one step; at 1 kHz and a stride of 0.2 mm this follows a hand at 6.4 m/s.
+const MAX_STRIDES: f64 = 32.0;
+
+/// The part, the tool and the state that a step starts from.
+#[derive(Debug)]
+pub struct Engine {
+    part: Arc<ContactPart>,
+    tool: Tool,
+    coupling: Option<VirtualCoupling>,
+    coupling_compliance: Option<[[f64; 6]; 6]>,
+    settings: EngineSettings,
+    reach_of_rotation: f64,
+    watch_list: WatchList,
+    scratch: Scratch,
+    last_target: Option<DPose3>,
+    /// Deviation of the tool from its target: position (m) and rotation vector (rad).
+    deviation: [f64; 6],
+}
+
+impl Engine {
+    /// Sizes all memory that steps will use.
+    ///
+    /// `coupling`: the virtual coupling between handle and tool, or `None` to impose the tool's
+    /// pose (no coupling compliance in the LCP; what reference cases ask for).
+    ///
+    /// # Errors
+    /// Settings that the LCP scratch refuses.
+    pub fn new(
+        part: Arc<ContactPart>,
+        tool: Tool,
+        coupling: Option<VirtualCoupling>,
+        settings: EngineSettings,
+    ) -> Result<Self, contact::Error> {
+        let max_contacts = settings.max_contacts.min(part.n_candidates()).max(1);
+        let scratch = Scratch::new(part.n_candidates(), max_contacts);
+        Ok(Self {
+            reach_of_rotation: reach_of_rotation(&tool, &part),
+            coupling_compliance: coupling.as_ref().map(VirtualCoupling::compliance),
+            coupling,
+            settings: EngineSettings {
+                max_contacts,
+                ..settings
+            },
+            watch_list: WatchList::new(&part, WATCH_SLACK * settings.near_distance)?,
+            scratch,
+            last_target: None,
+            deviation: [0.0; 6],
+            part,
+            tool,
+        })
+    }
+
+    /// The part that steps act on.
+    pub fn part(&self) -> &ContactPart {
+        &self.part
+    }
+
+    /// The rigid tool.
+    pub fn tool(&self) -> &Tool {
+        &self.tool
+    }
+
+    /// Forgets all contact: undeformed part, tool at its next target.
+    pub fn reset(&mut self) {
+        self.scratch.clear_contacts();
+        self.watch_list.forget();
+        self.last_target = None;
+        self.deviation = [0.0; 6];
+    }
+
+    /// Contacts that carry force after the last step.
+    pub fn active_contacts(&self) -> &[ActiveContact] {
+        &self.scratch.active
+    }
+
+    /// Displacement of candidate `candidate_idx` under the contact forces of the last step, m.
+    pub fn displacement(&self, candidate_idx: usize) -> DVec3 {
+        self.part.displacement(candidate_idx, &self.scratch.active)
+    }
+
+    /// One step. `target`: pose of the tool that the handle asks for, in the part's frame.
+    ///
+    /// Does not allocate, lock, log or block. A target that is not finite leaves the state as it
+    /// was and is flagged in the report.
+    pub fn step(&mut self, target: &DPose3) -> StepReport {
+        let mut report = StepReport::at(target);
+        let valid = target.translation.is_finite()
+            && target.rotation.is_finite()
+            && (target.rotation.length_squared() - 1.0).abs() < 1e-6;
+        if !valid {
+            report.rejected = true;
+            report.tool_pose = self.last_target.unwrap_or(DPose3::IDENTITY);
+            return report;
+        }
+        let from = self.last_target.unwrap_or(*target);
+        let motion = (target.translation - from.translation).length()
+            + self.reach_of_rotation * from.rotation.angle_between(target.rotation);
+        let n_strides = (motion / self.settings.max_stride)
+            .ceil()
+            .clamp(1.0, MAX_STRIDES);
+        report.strides = n_strides as u32;
+        for stride in 1..=report.strides {
+            let t = f64::from(stride) / n_strides;
+            let waypoint = if stride == report.strides {
+                *target
+            } else {
+                DPose3 {
+                    translation: from.translation.lerp(target.translation, t),
+                    rotation: from.rotation.slerp(target.rotation, t),
+                }
+            };
+            self.solve_at(&waypoint, &mut report);
+        }
+        self.last_target = Some(*target);
+        report
+    }
+
+    /// Equilibrium of part and tool for one target, warm-started from the state.
+    fn solve_at(&mut self, target: &DPose3, report: &mut StepReport) {
+        let (max_passes, tolerance) = match self.settings.contact_iterations {
+            ContactIterations::Converged => (MAX_PASSES, self.settings.displacement_tolerance),
+            ContactIterations::Fixed(n) => (n.max(1), 0.0),
+        };
+        report.passes = 0;
+        report.converged = false;
+        let mut tool_pose = VirtualCoupling::pose_from_deviation(target, &self.deviation);
+        while report.passes < max_passes {
+            report.passes += 1;
+            let change = self.pass(&mut tool_pose, target, report);
+            if change <= tolerance {
+                report.converged = true;
+                break;
+            }
+        }
+        if matches!(
+            self.settings.contact_iterations,
+            ContactIterations::Fixed(_)
+        ) {
+            report.converged = true;
+        }
+        report.tool_pose = tool_pose;
+        report.contacts = self.scratch.active.len() as u32;
+        self.balance(target, report);
+    }
+
+    /// One round of proximity, planes, Delassus, LCP and update.
+    /// Returns the largest change of a near node's displacement or of the tool's pose, m.
+    fn pass(&mut self, tool_pose: &mut DPose3, target: &DPose3, report: &mut StepReport) -> f64 {
+        let mut clock = StageClock::start();
+        let reference = tool_pose.translation;
+        let Scratch {
+            planes,
+            u_before,
+            w_matrix,
+            q,
+            active,
+            was_active,
+            ..
+        } = &mut self.scratch;
+        let part = self.part.as_ref();
+
+        // Which candidates can be near: a list that stays valid over many passes and steps.
+        let candidates = self.watch_list.update(
+            part,
+            &self.tool,
+            tool_pose,
+            active,
+            was_active,
+            self.settings.near_distance,
+        );
+        clock.lap(Stage::Proximity, report);
+
+        // One plane per near node, at its displaced position (paper, Fig. 3).
+        let position_of = |candidate: u32| {
+            let i = candidate as usize;
+            part.rest_positions()[i] + part.displacement(i, active)
+        };
+        let left_out = planes_into(
+            &self.tool,
+            tool_pose,
+            candidates,
+            position_of,
+            self.settings.near_distance,
+            planes,
+        );
+        report.dropped = (left_out.n_beyond_capacity + left_out.n_invalid) as u32;
+        report.near = planes.len() as u32;
+        u_before.clear();
+        u_before.extend(
+            planes
+                .iter()
+                .map(|p| p.point - part.rest_positions()[p.candidate as usize]),
+        );
+        clock.lap(Stage::Planes, report);
+
+        // W and q: compliance of part and coupling seen along the contact normals; q is the gap
+        // that remains at zero contact force.
+        let m = planes.len();
+        let coupling = self
+            .coupling_compliance
+            .as_ref()
+            .map(|matrix| CouplingCompliance { matrix, reference });
+        let assembled = delassus_into(part, planes, coupling, &mut w_matrix[..m * m]);
+        debug_assert!(assembled.is_ok(), "the matrix has the size of the planes");
+        for ((q, plane), u) in q.iter_mut().zip(planes.iter()).zip(u_before.iter()) {
+            let along: f64 = plane
+                .tool_row(reference)
+                .iter()
+                .zip(&self.deviation)
+                .map(|(h, e)| h * e)
+                .sum();
+            *q = plane.gap - plane.normal.dot(*u) + along;
+        }
+        clock.lap(Stage::Delassus, report);
+
+        self.scratch.solve(m, &self.settings.lcp, report);
+        clock.lap(Stage::Lcp, report);
+
+        // Forces of the near nodes become the state; the tool goes where its coupling balances.
+        self.scratch.adopt_forces(m);
+        let (force, torque) = wrench_on_tool(&self.scratch.planes, &self.scratch.z[..m], reference);
+        report.contact_wrench_on_tool = [force.x, force.y, force.z, torque.x, torque.y, torque.z];
+        if let Some(compliance) = &self.coupling_compliance {
+            self.deviation = compliance.map(|row| {
+                row.iter()
+                    .zip(&report.contact_wrench_on_tool)
+                    .map(|(c, f)| c * f)
+                    .sum()
+            });
+        }
+        let moved = VirtualCoupling::pose_from_deviation(target, &self.deviation);
+        let mut change = (moved.translation - tool_pose.translation).length()
+            + self.reach_of_rotation * moved.rotation.angle_between(tool_pose.rotation);
+        *tool_pose = moved;
+        for (plane, before) in self.scratch.planes.iter().zip(&self.scratch.u_before) {
+            let u = self
+                .part
+                .displacement(plane.candidate as usize, &self.scratch.active);
+            change = change.max((u - *before).length());
+        }
+        clock.lap(Stage::Update, report);
+        change
+    }
+
+    /// Fills in both sides of the tool's equilibrium.
+    fn balance(&self, target: &DPose3, report: &mut StepReport) {
+        report.coupling_wrench_on_tool = match &self.coupling {
+            Some(coupling) => {
+                let e = VirtualCoupling::deviation(target, &report.tool_pose);
+                coupling.wrench_on_tool(&e).to_array()
+            }
+            // An imposed pose carries whatever the contact asks for.
+            None => report.contact_wrench_on_tool.map(|x| -x),
+        };
+    }
+}
+
+/// m, lever with which a turn of the tool counts as motion: its size, or the part's where the tool
+/// has none or is larger.
+fn reach_of_rotation(tool: &Tool, part: &ContactPart) -> f64 {
+    let mut low = DVec3::INFINITY;
+    let mut high = DVec3::NEG_INFINITY;
+    for &x in part.rest_positions() {
+        low = low.min(x);
+        high = high.max(x);
+    }
+    tool.characteristic_size().min((high - low).length())
+}
+
+/// Adds the time between laps to the stages. It is never read by the computation.
+struct StageClock {
+    last: Instant,
+}
+
+impl StageClock {
+    fn start() -> Self {
+        Self {
+            last: Instant::now(),
+        }
+    }
+
+    fn lap(&mut self, stage: Stage, report: &mut StepReport) {
+        let now = Instant::now();
+        report.stage_ns[stage as usize] += (now - self.last).as_nanos() as u64;
+        self.last = now;
+    }
+}

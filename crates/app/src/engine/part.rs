@@ -1,0 +1,96 @@
+//! What the step needs of a prepared part: candidates at rest and the compliance between them.
+
+use bytemuck::cast_slice;
+use contact::delassus::ComplianceBlocks;
+use glam::{DMat3, DVec3};
+
+use super::ActiveContact;
+
+/// Candidate nodes and the compliance of the part as the step reads it.
+#[derive(Debug)]
+pub struct ContactPart {
+    rest: Vec<DVec3>,
+    n_rows: usize,
+    blocks: Vec<f64>,
+    /// m/N, by candidate j: largest Frobenius norm of C_ij over all candidates i.
+    largest_block: Vec<f64>,
+}
+
+impl ContactPart {
+    /// `rest`: rest positions of the candidates, m. `blocks`: 3x3 blocks of C, column-major
+    /// inside, block of row i and candidate j at `j * n_rows + i`; the first rows are the
+    /// candidates themselves, in the same order.
+    ///
+    /// # Panics
+    /// If the lengths do not fit together (a programmer's mistake).
+    pub fn new(rest: Vec<DVec3>, n_rows: usize, blocks: Vec<f64>) -> Self {
+        assert_eq!(
+            blocks.len(),
+            9 * n_rows * rest.len(),
+            "compliance blocks do not fit the candidates"
+        );
+        assert!(n_rows >= rest.len(), "the candidates are the first rows");
+        let largest_block = (0..rest.len())
+            .map(|j| {
+                let column = &cast_slice::<f64, DMat3>(&blocks)[j * n_rows..][..rest.len()];
+                column.iter().map(norm_squared).fold(0.0, f64::max).sqrt()
+            })
+            .collect();
+        Self {
+            rest,
+            n_rows,
+            blocks,
+            largest_block,
+        }
+    }
+
+    /// Number of candidate nodes.
+    pub fn n_candidates(&self) -> usize {
+        self.rest.len()
+    }
+
+    /// Rest positions of the candidates, m, part frame.
+    pub fn rest_positions(&self) -> &[DVec3] {
+        &self.rest
+    }
+
+    /// All blocks, in the layout of [`ContactPart::new`].
+    pub fn blocks(&self) -> &[f64] {
+        &self.blocks
+    }
+
+    /// Displacement of candidate `i` under the given contact forces, m: sum of C_ij f_j.
+    #[inline]
+    pub fn displacement(&self, i: usize, active: &[ActiveContact]) -> DVec3 {
+        let mut u = DVec3::ZERO;
+        for contact in active {
+            u += *self.block(i, contact.candidate as usize) * contact.force_on_part;
+        }
+        u
+    }
+
+    /// Largest Frobenius norm of a 3x3 block of a candidate's column, m/N: no candidate moves by
+    /// more than this times the force on it.
+    pub(super) fn largest_block(&self, candidate: u32) -> f64 {
+        self.largest_block[candidate as usize]
+    }
+
+    /// Upper bound on the displacement of any candidate, m.
+    pub fn displacement_bound(&self, active: &[ActiveContact]) -> f64 {
+        active
+            .iter()
+            .map(|c| self.largest_block[c.candidate as usize] * c.normal_force.abs())
+            .sum()
+    }
+}
+
+impl ComplianceBlocks for ContactPart {
+    #[inline]
+    fn block(&self, row: usize, col: usize) -> &DMat3 {
+        &cast_slice::<f64, DMat3>(&self.blocks)[col * self.n_rows + row]
+    }
+}
+
+fn norm_squared(c: &DMat3) -> f64 {
+    c.to_cols_array().iter().map(|x| x * x).sum()
+}

@@ -1,0 +1,136 @@
+//! What a step tells: pose, wrenches, certificate and the time of each stage.
+
+use glam::DVec3;
+use glamx::DPose3;
+
+/// Number of [`Stage`]s.
+pub const N_STAGES: usize = 5;
+
+/// The stages of a step, in their order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Which candidates can be near the tool.
+    Proximity,
+    /// Displaced positions, signed distances and normals: one plane per near node.
+    Planes,
+    /// W and q.
+    Delassus,
+    /// The linear complementarity problem.
+    Lcp,
+    /// Contact forces to displacements of the near nodes, and the tool's pose.
+    Update,
+}
+
+impl Stage {
+    /// All stages in order.
+    pub const ALL: [Self; N_STAGES] = [
+        Self::Proximity,
+        Self::Planes,
+        Self::Delassus,
+        Self::Lcp,
+        Self::Update,
+    ];
+
+    /// Name in tables and files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Proximity => "proximity",
+            Self::Planes => "planes",
+            Self::Delassus => "delassus",
+            Self::Lcp => "lcp",
+            Self::Update => "update",
+        }
+    }
+}
+
+/// A node that carries contact force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ActiveContact {
+    /// Index among the candidates.
+    pub candidate: u32,
+    /// N, along the tool's outward normal, on the part; >= 0.
+    pub normal_force: f64,
+    /// N, part frame: `normal_force` times the normal.
+    pub force_on_part: DVec3,
+}
+
+/// Result of one step. Wrenches are `[force N, torque N m]` in the part's frame, about the tool's
+/// origin.
+#[derive(Clone, Copy, Debug)]
+pub struct StepReport {
+    /// Pose of the tool in the part's frame.
+    pub tool_pose: DPose3,
+    /// What the contacts exert on the tool.
+    pub contact_wrench_on_tool: [f64; 6],
+    /// What the virtual coupling exerts on the tool; the handle feels its opposite.
+    pub coupling_wrench_on_tool: [f64; 6],
+    /// Nodes that had a plane in the last pass.
+    pub near: u32,
+    /// Nodes that carry force.
+    pub contacts: u32,
+    /// Near nodes left out because memory for more was not reserved.
+    pub dropped: u32,
+    /// Passes over the contact planes (of the last stride).
+    pub passes: u32,
+    /// Strides in which a fast handle was followed.
+    pub strides: u32,
+    /// Changes of the active set of all LCPs of the step, each one factorisation.
+    pub pivots: u32,
+    /// Natural residual of the last LCP, scaled: max |min(z / max z, w / max q)|.
+    pub certificate: f64,
+    /// Whether the last LCP was solved; otherwise its best answer was used.
+    pub lcp_solved: bool,
+    /// Whether the planes stood still at the end (always true for a fixed number of passes).
+    pub converged: bool,
+    /// Whether the target pose was refused (not finite, or no unit quaternion).
+    pub rejected: bool,
+    /// Nanoseconds by [`Stage`].
+    pub stage_ns: [u64; N_STAGES],
+}
+
+impl StepReport {
+    pub(super) fn at(target: &DPose3) -> Self {
+        Self {
+            tool_pose: *target,
+            contact_wrench_on_tool: [0.0; 6],
+            coupling_wrench_on_tool: [0.0; 6],
+            near: 0,
+            contacts: 0,
+            dropped: 0,
+            passes: 0,
+            strides: 0,
+            pivots: 0,
+            certificate: 0.0,
+            lcp_solved: true,
+            converged: true,
+            rejected: false,
+            stage_ns: [0; N_STAGES],
+        }
+    }
+
+    /// N, on the tool, from the contacts.
+    pub fn contact_force_on_tool(&self) -> DVec3 {
+        DVec3::new(
+            self.contact_wrench_on_tool[0],
+            self.contact_wrench_on_tool[1],
+            self.contact_wrench_on_tool[2],
+        )
+    }
+
+    /// How far contact and coupling are from balancing on the tool, relative to the contact
+    /// force, with torques made comparable by `lever` (m). Forces under 1 mN, two hundred times
+    /// below what the finest device resolves, count as 1 mN: there the coupling's deflection is
+    /// the difference of two positions and has no nine digits left.
+    pub fn wrench_mismatch_rel(&self, lever: f64) -> f64 {
+        let (contact, coupling) = (&self.contact_wrench_on_tool, &self.coupling_wrench_on_tool);
+        let norm = |from: usize, f: &dyn Fn(usize) -> f64| {
+            (from..from + 3).map(|i| f(i) * f(i)).sum::<f64>().sqrt()
+        };
+        let force = norm(0, &|i| contact[i] + coupling[i]);
+        let torque = norm(3, &|i| contact[i] + coupling[i]);
+        let scale = norm(0, &|i| contact[i])
+            .max(norm(3, &|i| contact[i]) / lever)
+            .max(1e-3);
+        force.max(torque / lever) / scale
+    }
+}

@@ -1,0 +1,88 @@
+//! Everything that can end a command, with the exit code it means.
+
+use std::path::PathBuf;
+
+use crate::interrupt;
+
+/// Why a command ended without its result.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The scene file.
+    #[error(transparent)]
+    Scene(#[from] crate::scene::SceneError),
+    /// The mesh, the material or the supports.
+    #[error("{path}: {source}", path = path.display())]
+    Part {
+        /// The mesh file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: fem::Error,
+    },
+    /// The tool.
+    #[error("{path}: {source}", path = path.display())]
+    Tool {
+        /// The scene or tool file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: contact::Error,
+    },
+    /// The device.
+    #[error("device: {0}")]
+    Device(#[from] device::DeviceError),
+    /// The GPU path or its CPU twin.
+    #[error("compliance multiply: {0}")]
+    Multiply(#[from] gpu::Error),
+    /// Writing the result.
+    #[error(transparent)]
+    Report(#[from] crate::report::ReportError),
+    /// A file or folder that cannot be read or written.
+    #[error("{path}: cannot {action}: {source}", path = path.display())]
+    Io {
+        /// Where.
+        path: PathBuf,
+        /// What was tried.
+        action: &'static str,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// Input that fits no command.
+    #[error("{0}")]
+    Input(String),
+    /// Ctrl-C.
+    #[error("stopped by Ctrl-C; nothing was written and earlier results are untouched")]
+    Interrupted,
+}
+
+impl Error {
+    /// 130 for Ctrl-C, else 2: a usage or input error.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Interrupted => interrupt::EXIT_CODE,
+            Self::Part { source, .. } if source.is_cancelled() => interrupt::EXIT_CODE,
+            _ => 2,
+        }
+    }
+
+    pub(crate) fn part(path: &std::path::Path, source: fem::Error) -> Self {
+        if source.is_cancelled() {
+            return Self::Interrupted;
+        }
+        Self::Part {
+            path: path.to_path_buf(),
+            source,
+        }
+    }
+
+    pub(crate) fn io(
+        path: &std::path::Path,
+        action: &'static str,
+    ) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.to_path_buf();
+        move |source| Self::Io {
+            path,
+            action,
+            source,
+        }
+    }
+}

@@ -1,0 +1,579 @@
+//! From a recording to what the report tells: moments worth a picture, extremes, verdicts.
+
+mod drawing;
+
+use glam::DVec3;
+
+use crate::Error;
+use crate::effects::{Observed, Verdict, judge};
+use crate::engine::{Engine, Stage};
+use crate::fields::FieldSolver;
+use crate::machine::Machine;
+use crate::prepare::PreparedPart;
+use crate::prepare::budget::bytes;
+use crate::report::{
+    ContactForce, Effect, Facts, Frame, Handbook, HandbookRow, Outputs, PaperStage, Phase, Run,
+    StepRow, View,
+};
+use crate::scene::{EffectChoice, Scene, ToolShape};
+use crate::session::{Record, Recording, part_extent};
+
+/// Steps of which strain and rotation are looked at, besides those that are drawn.
+const SAMPLED_STEPS: usize = 40;
+
+/// Everything that a run is made of.
+pub(crate) struct Story<'a> {
+    pub(crate) scene: &'a Scene,
+    pub(crate) prepared: &'a PreparedPart,
+    pub(crate) engine: &'a Engine,
+    pub(crate) recording: &'a Recording,
+    pub(crate) remarks: Vec<String>,
+}
+
+impl Story<'_> {
+    /// Solves for the pictures and puts the report's data together.
+    ///
+    /// # Errors
+    /// As the field solver; Ctrl-C.
+    pub(crate) fn tell(mut self, progress: &dyn fem::Progress) -> Result<Run, Error> {
+        let Story {
+            scene,
+            prepared,
+            recording,
+            ..
+        } = self;
+        let solver = FieldSolver::new(&prepared.loaded, progress)?;
+        let moments = Moments::of(recording);
+        let mut extremes = fem::stress::Extremes::default();
+        let mut look = |u: &[f64]| {
+            let here = solver.extremes(u);
+            extremes.max_principal_strain =
+                extremes.max_principal_strain.max(here.max_principal_strain);
+            extremes.max_rotation = extremes.max_rotation.max(here.max_rotation);
+        };
+        for index in moments.sampled() {
+            if crate::interrupt::is_requested() {
+                return Err(Error::Interrupted);
+            }
+            look(&solver.displacement(recording.contacts(&recording.records[index])));
+        }
+        let tool_extent = 0.4 * part_extent(&prepared.loaded.mesh);
+        let mut frames = Vec::new();
+        for (label, index) in moments.labelled(scene.output.frames as usize) {
+            let record = &recording.records[index];
+            let u = solver.displacement(recording.contacts(record));
+            look(&u);
+            frames.push(self.frame(label, record, &u, solver.von_mises(&u), tool_extent));
+        }
+
+        let strain = extremes.max_principal_strain;
+        if let Some(limit) = scene
+            .part
+            .material
+            .permissible_strain
+            .filter(|limit| strain > *limit)
+        {
+            self.remarks.push(format!(
+                "the largest strain of {:.2} % is beyond what the material bears ({:.2} %): the real \
+                 part yields, and the force is not to be trusted",
+                100.0 * strain,
+                100.0 * limit
+            ));
+        }
+        let observed = self.observed(&moments, extremes.max_rotation);
+        let verdicts: Vec<Verdict> = judge(&observed)
+            .into_iter()
+            .filter(|v| choice(scene, v.name) == EffectChoice::Auto || v.missing)
+            .collect();
+        let mut warnings = self.remarks.clone();
+        warnings.extend(verdicts.iter().filter(|v| v.missing).map(|v| {
+            let number = v.number.map(|n| format!("{n:.2}")).unwrap_or_default();
+            format!(
+                "this scene calls for {}, which this version does not simulate ({number} beyond {:.2}): {}",
+                v.name.replace('_', " "),
+                v.threshold,
+                v.why
+            )
+        }));
+        warnings.extend(self.troubles());
+        let rows: Vec<StepRow> = recording.records.iter().map(|r| self.row(r)).collect();
+        let loaded = &prepared.loaded;
+        Ok(Run {
+            title: scene.title.clone(),
+            scene_path: scene.path.display().to_string(),
+            machine: Machine::read().summary(),
+            settings: self.settings(),
+            checks: self.checks(),
+            notes: self.notes(),
+            warnings,
+            facts: Facts {
+                nodes: loaded.mesh.n_nodes(),
+                elements: loaded.mesh.n_elements(),
+                order: loaded.mesh.order as u32,
+                surface_nodes: loaded.rows.len(),
+                candidates: loaded.candidates.len(),
+                coupling_stiffness: Some(scene.coupling.translational_stiffness),
+                prepare_s: prepared.total_seconds(),
+                from_cache: prepared.from_cache,
+                missed_deadlines: recording.servo.missed_deadlines,
+                max_principal_strain: strain,
+                max_rotation_deg: extremes.max_rotation.to_degrees(),
+            },
+            handbook: self.handbook(&rows),
+            paper: paper(&rows),
+            rows,
+            part: drawing::part(&loaded.mesh),
+            frames,
+            effects: verdicts
+                .into_iter()
+                .map(|v| Effect {
+                    name: v.name.to_owned(),
+                    on: v.on,
+                    number: v.number,
+                    threshold: v.threshold,
+                    why: v.why,
+                })
+                .collect(),
+            view: view(scene),
+            outputs: Outputs {
+                png: scene.output.pictures,
+                vtu: scene.output.vtu,
+                mcap: scene.output.mcap,
+            },
+        })
+    }
+
+    fn row(&self, record: &Record) -> StepRow {
+        let reach = part_extent(&self.prepared.loaded.mesh);
+        StepRow {
+            step: record.step,
+            time_s: record.time_s,
+            phase: match record.phase {
+                device::Phase::Approach => Phase::Approach,
+                device::Phase::Retract => Phase::Retract,
+                device::Phase::Hold | device::Phase::Done => Phase::Hold,
+            },
+            travel_m: record.travel,
+            // Adding zero turns a negative zero into a zero.
+            force_n: self.recording.resistance(record) + 0.0,
+            force_on_handle: record.wrench_on_handle.force + DVec3::ZERO,
+            contacts: record.report.contacts,
+            pivots: record.report.pivots,
+            certificate: record.report.certificate,
+            wrench_mismatch_rel: record.report.wrench_mismatch_rel(reach),
+            handle_position: record.handle_pose.translation,
+            tool_position: record.report.tool_pose.translation,
+            stage_ns: record.report.stage_ns,
+            total_ns: record.step_ns,
+            multiply_ns: record.multiply_ns,
+        }
+    }
+
+    fn frame(
+        &self,
+        label: String,
+        record: &Record,
+        u: &[f64],
+        von_mises: Vec<f64>,
+        extent: f64,
+    ) -> Frame {
+        let loaded = &self.prepared.loaded;
+        let displacement: Vec<DVec3> = u.chunks_exact(3).map(DVec3::from_slice).collect();
+        let contacts = self
+            .recording
+            .contacts(record)
+            .iter()
+            .map(|c| {
+                let node = loaded.candidates[c.candidate as usize];
+                let rest = DVec3::from_array(loaded.mesh.nodes[node as usize]);
+                ContactForce {
+                    node,
+                    point: rest + displacement[node as usize],
+                    force: c.force_on_part,
+                }
+            })
+            .collect();
+        let (corners, triangles) = self.engine.tool().tessellate(extent);
+        let pose = record.report.tool_pose;
+        let corner = |i: u32| pose * corners[i as usize];
+        Frame {
+            label,
+            step: record.step,
+            travel_m: record.travel,
+            force_n: self.recording.resistance(record) + 0.0,
+            displacement,
+            von_mises,
+            contacts,
+            tool: triangles.into_iter().map(|t| t.map(corner)).collect(),
+        }
+    }
+
+    fn observed(&self, moments: &Moments, max_rotation: f64) -> Observed {
+        let records = &self.recording.records;
+        let fastest = records
+            .windows(2)
+            .map(|w| {
+                (w[1].report.tool_pose.translation - w[0].report.tool_pose.translation).length()
+            })
+            .fold(0.0, f64::max);
+        let feature = drawing::shortest_edge(&self.prepared.loaded.mesh)
+            .min(self.engine.tool().characteristic_size());
+        let ramp_angle = moments.peak.and_then(|i| {
+            let normal: f64 = self
+                .recording
+                .contacts(&records[i])
+                .iter()
+                .map(|c| c.normal_force)
+                .sum();
+            let axial = self.recording.resistance(&records[i]).abs();
+            (normal > 0.0).then(|| (axial / normal).clamp(0.0, 1.0).asin())
+        });
+        Observed {
+            max_rotation,
+            ramp_angle,
+            friction_coefficient: self.scene.effects.friction_coefficient,
+            motion_per_feature: fastest / feature,
+        }
+    }
+
+    /// What did not go as it should, in words.
+    fn troubles(&self) -> Vec<String> {
+        let records = &self.recording.records;
+        let count = |test: &dyn Fn(&Record) -> bool| records.iter().filter(|r| test(r)).count();
+        let safety = &self.recording.servo.safety;
+        let device = &self.recording.device;
+        let all = [
+            (
+                count(&|r| !r.report.converged) as u64,
+                "steps whose contact planes did not come to a stand",
+            ),
+            (
+                count(&|r| !r.report.lcp_solved) as u64,
+                "steps whose contact problem was not solved to its tolerance",
+            ),
+            (
+                count(&|r| r.report.dropped > 0) as u64,
+                "steps with more near nodes than accuracy.max_contacts",
+            ),
+            (
+                safety.samples_rejected(),
+                "poses of the device were refused",
+            ),
+            (
+                safety.wrenches_clamped,
+                "wrenches were cut to the device's limits",
+            ),
+            (
+                safety.wrenches_rate_limited,
+                "wrenches were slowed to the device's largest rate",
+            ),
+            (
+                device.thermally_limited,
+                "wrenches were cut to what the device bears for long",
+            ),
+        ];
+        all.into_iter()
+            .filter(|(n, _)| *n > 0)
+            .map(|(n, what)| format!("{n} {what}"))
+            .collect()
+    }
+
+    fn settings(&self) -> Vec<(String, String)> {
+        let scene = self.scene;
+        let (hand, material) = (&scene.hand, &scene.part.material);
+        let shape = match &scene.tool.shape {
+            ToolShape::Sphere { radius } => format!("sphere, radius {} mm", 1e3 * radius),
+            ToolShape::Cylinder {
+                radius,
+                half_length: None,
+            } => {
+                format!("cylinder without end, radius {} mm", 1e3 * radius)
+            }
+            ToolShape::Cylinder {
+                radius,
+                half_length: Some(h),
+            } => {
+                format!(
+                    "cylinder, radius {} mm, length {} mm",
+                    1e3 * radius,
+                    2e3 * h
+                )
+            }
+            ToolShape::Box { half_extents: h } => {
+                format!("box {} x {} x {} mm", 2e3 * h.x, 2e3 * h.y, 2e3 * h.z)
+            }
+            ToolShape::Capsule {
+                radius,
+                half_length,
+            } => {
+                format!(
+                    "capsule, radius {} mm, length {} mm",
+                    1e3 * radius,
+                    2e3 * half_length
+                )
+            }
+            ToolShape::HalfSpace => "half-space".to_owned(),
+            ToolShape::Mesh { file, .. } => file.display().to_string(),
+        };
+        let pair = |label: &str, value: String| (label.to_owned(), value);
+        vec![
+            pair("mesh", scene.part.mesh.display().to_string()),
+            pair(
+                "material",
+                format!(
+                    "{}E {:.4e} Pa, Poisson's ratio {}",
+                    material
+                        .name
+                        .as_ref()
+                        .map(|n| format!("{n}, "))
+                        .unwrap_or_default(),
+                    material.young_modulus,
+                    material.poisson_ratio
+                ),
+            ),
+            pair(
+                "quadrature",
+                format!("{:?}", scene.part.quadrature).to_lowercase(),
+            ),
+            pair("tool", shape),
+            pair(
+                "held by the handle",
+                format!("{:?}", scene.handle).to_lowercase(),
+            ),
+            pair(
+                "hand",
+                format!(
+                    "{} mm at {} mm/s, {} kg on {} N/m and {} N s/m",
+                    1e3 * hand.travel,
+                    1e3 * hand.speed,
+                    hand.mass,
+                    hand.stiffness,
+                    hand.damping
+                ),
+            ),
+            pair(
+                "virtual coupling",
+                format!(
+                    "{} N/m, {} N m/rad",
+                    scene.coupling.translational_stiffness, scene.coupling.rotational_stiffness
+                ),
+            ),
+            pair(
+                "device",
+                format!(
+                    "simulated Virtuose 6D, {} ms period, {}",
+                    1e3 * scene.device.servo_period,
+                    if scene.device.real_time {
+                        "in real time"
+                    } else {
+                        "as fast as possible"
+                    }
+                ),
+            ),
+            pair(
+                "contact iterations",
+                format!("{:?}", scene.accuracy.contact_iterations).to_lowercase(),
+            ),
+            pair(
+                "compliance",
+                bytes(8.0 * self.prepared.compliance.blocks.len() as f64),
+            ),
+        ]
+    }
+
+    fn checks(&self) -> Vec<(String, String)> {
+        let checks = &self.prepared.checks;
+        let pair = |label: &str, value: String| (label.to_owned(), value);
+        vec![
+            pair(
+                "compliance, asymmetry over largest entry",
+                format!("{:.1e}", checks.symmetry_rel),
+            ),
+            pair(
+                "compliance, residual |K x - e|",
+                format!("{:.1e}", checks.residual_rel),
+            ),
+            pair(
+                "compliance, smallest over largest Cholesky pivot",
+                format!("{:.1e}", checks.smallest_pivot_rel),
+            ),
+        ]
+    }
+
+    fn notes(&self) -> Vec<String> {
+        vec![
+            "Travel is that of the held body in the simulation; the handle is ahead of it by the force \
+             over the stiffness of the virtual coupling, which acts in series with the part."
+                .to_owned(),
+            "Contact is frictionless and quasi-static, displacements are linear; strain and rotation are \
+             the largest at the integration points."
+                .to_owned(),
+        ]
+    }
+
+    fn handbook(&self, rows: &[StepRow]) -> Option<Handbook> {
+        let hook = self.scene.handbook.as_ref()?;
+        let young_modulus = self.scene.part.material.young_modulus;
+        let frictionless = crate::scene::Handbook {
+            friction: 0.0,
+            ..*hook
+        };
+        let touch = rows
+            .iter()
+            .find(|r| r.contacts > 0)
+            .map_or(0.0, |r| r.travel_m);
+        let peak = rows.iter().map(|r| r.force_n).fold(0.0, f64::max);
+        let direction = self.recording.direction;
+        let across = rows
+            .iter()
+            .map(|r| r.force_on_handle.reject_from(direction).length())
+            .fold(0.0, f64::max);
+        let row = |label: &str, handbook: f64, computed: f64, unit: &str| HandbookRow {
+            label: label.to_owned(),
+            handbook,
+            computed,
+            unit: unit.to_owned(),
+        };
+        Some(Handbook {
+            name: "cantilever snap hook: P = (b h²/6) E ε/L, ε = 1.5 h y/L², W = P (μ + tan α)/(1 − μ tan α), without friction".to_owned(),
+            rows: vec![
+                row("mating force", frictionless.mating_force(young_modulus), peak, "N"),
+                row("largest force across", frictionless.deflection_force(young_modulus), across, "N"),
+            ],
+            curve: frictionless
+                .curve(young_modulus)
+                .iter()
+                .map(|(travel, force)| (travel + touch, *force))
+                .collect(),
+        })
+    }
+}
+
+fn choice(scene: &Scene, effect: &str) -> EffectChoice {
+    let e = &scene.effects;
+    match effect {
+        "friction" => e.friction,
+        "large_rotation" => e.large_rotation,
+        "gravity" => e.gravity,
+        "tool_inertia" => e.tool_inertia,
+        "part_inertia" => e.part_inertia,
+        "damping" => e.damping,
+        "continuous_collision" => e.continuous_collision,
+        _ => e.deformable_tool,
+    }
+}
+
+/// Along the tool's axis if it has one, else across the approach.
+fn view(scene: &Scene) -> View {
+    let axis = match scene.tool.shape {
+        ToolShape::Cylinder { .. } | ToolShape::Capsule { .. } => {
+            scene.tool.pose_part_tool.rotation * DVec3::Z
+        }
+        _ => scene.hand.direction.any_orthonormal_vector(),
+    };
+    let up = if axis.y.abs() < 0.9 {
+        DVec3::Y
+    } else {
+        DVec3::Z
+    };
+    View::three_quarter(-axis, up)
+}
+
+/// The paper's three times beside the medians of the same work here, while something touches.
+fn paper(rows: &[StepRow]) -> Vec<PaperStage> {
+    let median = |time: &dyn Fn(&StepRow) -> Option<u64>| {
+        let mut times: Vec<u64> = rows
+            .iter()
+            .filter(|r| r.contacts > 0)
+            .filter_map(time)
+            .collect();
+        times.sort_unstable();
+        times
+            .get(times.len() / 2)
+            .map_or(0.0, |ns| 1e-3 * *ns as f64)
+    };
+    let of =
+        |row: &StepRow, stages: &[Stage]| stages.iter().map(|s| row.stage_ns[*s as usize]).sum();
+    PaperStage::duriez_2004(
+        median(&|r| Some(of(r, &[Stage::Proximity, Stage::Planes]))),
+        median(&|r| Some(of(r, &[Stage::Delassus, Stage::Lcp, Stage::Update]))),
+        median(&|r| r.multiply_ns),
+    )
+}
+
+/// Records worth a look, by index.
+struct Moments {
+    n: usize,
+    touch: Option<usize>,
+    peak: Option<usize>,
+    crest: Option<usize>,
+    pull: Option<usize>,
+}
+
+impl Moments {
+    fn of(recording: &Recording) -> Self {
+        let records = &recording.records;
+        let force: Vec<f64> = records.iter().map(|r| recording.resistance(r)).collect();
+        let end = records
+            .iter()
+            .position(|r| r.phase == device::Phase::Retract)
+            .unwrap_or(records.len());
+        let touch = records.iter().position(|r| r.report.contacts > 0);
+        let peak = touch.and_then(|_| (0..end).max_by(|&a, &b| force[a].total_cmp(&force[b])));
+        let crest = peak.and_then(|p| (p..end).find(|&i| force[i] <= 0.0));
+        let pull = crest.and_then(|c| (c..end).min_by(|&a, &b| force[a].total_cmp(&force[b])));
+        Self {
+            n: records.len(),
+            touch,
+            peak,
+            crest,
+            pull,
+        }
+    }
+
+    fn sampled(&self) -> Vec<usize> {
+        let mut all: Vec<usize> = self
+            .between(SAMPLED_STEPS)
+            .chain([self.peak, self.crest, self.pull].into_iter().flatten())
+            .collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+
+    /// Evenly from the first touch to the end.
+    fn between(&self, count: usize) -> impl Iterator<Item = usize> + '_ {
+        let from = self.touch.unwrap_or(0);
+        let span = self.n.saturating_sub(from + 1);
+        (0..count.min(span)).map(move |k| from + k * span / count.max(1))
+    }
+
+    /// The named moments first, then what fills up to `count`, in order of time.
+    fn labelled(&self, count: usize) -> Vec<(String, usize)> {
+        let named = [
+            (self.peak, "peak"),
+            (self.n.checked_sub(1), "home"),
+            (self.pull, "pull"),
+            (self.touch, "first contact"),
+            (self.crest, "crest"),
+        ];
+        let mut moments: Vec<(String, usize)> = Vec::new();
+        for (index, label) in named {
+            if let Some(index) = index.filter(|i| moments.iter().all(|m| m.1 != *i)) {
+                moments.push((label.to_owned(), index));
+            }
+        }
+        moments.truncate(count);
+        let missing = count.saturating_sub(moments.len());
+        let touch = self.touch.unwrap_or(0);
+        let rise = self.peak.unwrap_or(self.n).saturating_sub(touch);
+        for k in 1..=missing {
+            let index = touch + k * rise / (missing + 1);
+            if index < self.n && moments.iter().all(|m| m.1 != index) {
+                moments.push(("rise".to_owned(), index));
+            }
+        }
+        moments.sort_by_key(|m| m.1);
+        moments
+    }
+}

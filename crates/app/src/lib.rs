@@ -1,0 +1,28 @@
+//! Assembles the crates of the workspace into the program: a scene file becomes a prepared part,
+//! a prepared part becomes an engine, and a hand on a device pushes the tool onto the part.
+//!
+//! The data's way: [`scene`] (file to validated scene) → [`prepare`] (mesh to compliance, cached)
+//! → [`engine`] (one deterministic haptic step) → [`session`] (device, hand and engine)
+//! → [`report`] (tables, plots, pictures). [`study`] compares with other programs.
+
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+pub mod cli;
+pub mod effects;
+pub mod engine;
+mod error;
+mod evaluate;
+pub mod fields;
+pub mod interrupt;
+pub mod machine;
+mod output;
+pub mod prepare;
+pub mod progress;
+pub mod report;
+pub mod scene;
+pub mod session;
+pub mod setup;
+pub mod study;
+
+pub use cli::run;
+pub use error::Error;

@@ -1,0 +1,338 @@
+//! From a mesh to a part that can be touched: assembled, held, factored, condensed, checked, kept.
+//!
+//! The costly result, the compliance of the surface under forces on the nodes that can touch,
+//! is cached under a hash of everything it depends on ([`cache`]); what it will need is told
+//! before it is begun ([`budget`]).
+
+pub mod budget;
+pub mod cache;
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use fem::{Compliance, ComplianceChecks, FactoredStiffness, Material, Mesh, Quadrature, Supports};
+use glam::DVec3;
+
+use crate::Error;
+use crate::engine::ContactPart;
+use crate::progress::Ui;
+use budget::Forecast;
+
+/// A physical group and who asks for it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GroupRef {
+    /// Name of the group in the mesh.
+    pub name: String,
+    /// Who names it, for messages: file and line.
+    pub place: String,
+}
+
+/// What is to be prepared: the part of a scene in plain terms.
+#[derive(Clone, Debug)]
+pub struct PartSpec {
+    /// Gmsh mesh.
+    pub mesh_path: PathBuf,
+    /// Factor from mesh coordinates to metres.
+    pub length_scale: f64,
+    /// Order that the scene asks for; `None`: the mesh's own.
+    pub order: Option<u8>,
+    /// Elasticity.
+    pub material: Material,
+    /// Held groups and which of x, y, z is held.
+    pub fixed: Vec<(GroupRef, [bool; 3])>,
+    /// Groups of nodes that can touch the tool.
+    pub contact: Vec<GroupRef>,
+    /// Rule for the element integrals.
+    pub quadrature: Quadrature,
+}
+
+/// How to prepare.
+#[derive(Clone, Debug, Default)]
+pub struct PrepareOptions {
+    /// Folder of cached parts; `None`: do not read or write any.
+    pub cache_dir: Option<PathBuf>,
+    /// Ignore what is cached and write it anew.
+    pub rebuild: bool,
+}
+
+/// A part that is read, held and checked, before its compliance is known.
+#[derive(Debug)]
+pub struct LoadedPart {
+    /// What was asked for.
+    pub spec: PartSpec,
+    /// In metres.
+    pub mesh: Mesh,
+    /// Held degrees of freedom.
+    pub supports: Supports,
+    /// Node indices that can touch, not held, ascending.
+    pub candidates: Vec<u32>,
+    /// Node indices of the whole surface, candidates first.
+    pub rows: Vec<u32>,
+    /// Lines about the mesh that the user should see.
+    pub warnings: Vec<String>,
+    mesh_hash: [u8; 32],
+}
+
+/// A part with its compliance.
+#[derive(Debug)]
+pub struct PreparedPart {
+    /// Mesh, supports and who can touch.
+    pub loaded: LoadedPart,
+    /// Surface displacement per force on the nodes that can touch.
+    pub compliance: Compliance,
+    /// What was checked after the build.
+    pub checks: ComplianceChecks,
+    /// Seconds by stage, in order; a cached part has only the reading.
+    pub seconds: Vec<(&'static str, f64)>,
+    /// Whether the compliance came from the cache.
+    pub from_cache: bool,
+    /// The cache file, if one is used.
+    pub cache_file: Option<PathBuf>,
+}
+
+impl PreparedPart {
+    /// Seconds altogether.
+    pub fn total_seconds(&self) -> f64 {
+        self.seconds.iter().map(|(_, s)| s).sum()
+    }
+
+    /// What the engine needs of the part.
+    pub fn contact_part(&self) -> ContactPart {
+        let rest = self
+            .compliance
+            .candidates
+            .iter()
+            .map(|&node| DVec3::from_array(self.loaded.mesh.nodes[node as usize]))
+            .collect();
+        ContactPart::new(
+            rest,
+            self.compliance.rows.len(),
+            self.compliance.blocks.clone(),
+        )
+    }
+}
+
+/// Reads the mesh and finds everything that would make the stiffness singular or wrong.
+///
+/// # Errors
+/// An unreadable mesh, a group that is not in it, elements that are inverted, a free rigid
+/// motion, no node that can touch.
+pub fn load(spec: &PartSpec) -> Result<LoadedPart, Error> {
+    let path = &spec.mesh_path;
+    let bytes = std::fs::read(path).map_err(Error::io(path, "read the mesh"))?;
+    let mesh_hash = *blake3::hash(&bytes).as_bytes();
+    let mut mesh = fem::mesh::gmsh::read_bytes(&bytes, path).map_err(|e| Error::part(path, e))?;
+    if spec.length_scale != 1.0 {
+        mesh.scale(spec.length_scale);
+    }
+    if let Some(order) = spec.order
+        && usize::from(order) != mesh.order as usize
+    {
+        return Err(Error::Input(format!(
+            "{}: the mesh has elements of order {}, the scene asks for order = {order}; \
+             set part.order = {} or make the mesh with `gmsh -order {order}`",
+            path.display(),
+            mesh.order as usize,
+            mesh.order as usize
+        )));
+    }
+    let mut supports = Supports::new(mesh.n_nodes());
+    for (name, components) in &spec.fixed {
+        for &node in &group(&mesh, name, path, "fixed")?.nodes {
+            supports.fix_node(node, *components);
+        }
+    }
+    let warnings = mesh.check(&supports).map_err(|e| Error::part(path, e))?;
+
+    let mut can_touch = vec![false; mesh.n_nodes()];
+    for name in &spec.contact {
+        for &node in &group(&mesh, name, path, "contact")?.nodes {
+            can_touch[node as usize] = !supports.is_fixed_in_all(node);
+        }
+    }
+    let candidates: Vec<u32> = (0..mesh.n_nodes() as u32)
+        .filter(|&i| can_touch[i as usize])
+        .collect();
+    if candidates.is_empty() && !spec.contact.is_empty() {
+        return Err(Error::Input(format!(
+            "{}: every node of contact is held in {}, so nothing can touch; name a group of faces \
+             that are free to move",
+            spec.contact[0].place,
+            path.display(),
+        )));
+    }
+    let mut rows = candidates.clone();
+    rows.extend(
+        mesh.surface_nodes()
+            .into_iter()
+            .filter(|&node| !can_touch[node as usize]),
+    );
+    Ok(LoadedPart {
+        spec: spec.clone(),
+        mesh,
+        supports,
+        candidates,
+        rows,
+        warnings,
+        mesh_hash,
+    })
+}
+
+fn group<'a>(
+    mesh: &'a Mesh,
+    wanted: &GroupRef,
+    path: &Path,
+    role: &str,
+) -> Result<&'a fem::Group, Error> {
+    mesh.group(&wanted.name).ok_or_else(|| {
+        let known: Vec<&str> = mesh.groups.iter().map(|g| g.name.as_str()).collect();
+        let mend = if known.is_empty() {
+            "it has none: name regions in Gmsh with Physical Surface(\"...\")".to_owned()
+        } else {
+            format!("it has {}", known.join(", "))
+        };
+        Error::Input(format!(
+            "{}: {role} names the group {:?}, which {} does not have; {mend}",
+            wanted.place,
+            wanted.name,
+            path.display(),
+        ))
+    })
+}
+
+/// Loads the part and gets its compliance, from the cache or anew.
+///
+/// # Errors
+/// As [`load`]; a part that does not fit into memory; a singular stiffness; checks that fail;
+/// Ctrl-C.
+pub fn prepare(
+    spec: &PartSpec,
+    options: &PrepareOptions,
+    ui: &Ui<'_>,
+) -> Result<PreparedPart, Error> {
+    let begun = Instant::now();
+    let loaded = load(spec)?;
+    for warning in &loaded.warnings {
+        ui.note(&format!("warning: {warning}"));
+    }
+    let mut seconds = vec![("read the mesh", begun.elapsed().as_secs_f64())];
+
+    let key = cache_key(&loaded);
+    let cache_file = options
+        .cache_dir
+        .as_ref()
+        .map(|dir| cache::file_of(dir, &spec.mesh_path, &key));
+    if let (Some(file), false) = (&cache_file, options.rebuild) {
+        let reading = Instant::now();
+        match cache::read(file, &key, &loaded.candidates, &loaded.rows) {
+            Ok(Some((compliance, checks))) => {
+                seconds.push(("read the cache", reading.elapsed().as_secs_f64()));
+                return Ok(PreparedPart {
+                    loaded,
+                    compliance,
+                    checks,
+                    seconds,
+                    from_cache: true,
+                    cache_file,
+                });
+            }
+            Ok(None) => {}
+            Err(why) => {
+                ui.note(&format!(
+                    "{}: {why}; the part is prepared anew",
+                    file.display()
+                ));
+            }
+        }
+    }
+
+    let forecast = Forecast::of(&loaded);
+    ui.note(&forecast.line(&loaded));
+    forecast.refuse_what_cannot_fit(&loaded)?;
+
+    let (compliance, checks, stages) = build(&loaded, ui)?;
+    seconds.extend(stages);
+    let mut written = None;
+    if let Some(file) = cache_file {
+        match cache::write(&file, &key, &compliance, &checks) {
+            Ok(()) => written = Some(file),
+            Err(source) => ui.note(&format!(
+                "{}: cannot keep the prepared part ({source}); the next run prepares it again \
+                 (SNAPIN_CACHE names another folder)",
+                file.display()
+            )),
+        }
+    }
+    Ok(PreparedPart {
+        loaded,
+        compliance,
+        checks,
+        seconds,
+        from_cache: false,
+        cache_file: written,
+    })
+}
+
+/// Stiffness of a loaded part.
+///
+/// # Errors
+/// As `fem` reports them, with the mesh's path.
+pub fn assemble(loaded: &LoadedPart) -> Result<fem::Stiffness, Error> {
+    let of_element = vec![0; loaded.mesh.n_elements()];
+    fem::assemble_stiffness(
+        &loaded.mesh,
+        std::slice::from_ref(&loaded.spec.material),
+        &of_element,
+        loaded.spec.quadrature,
+    )
+    .map_err(|e| Error::part(&loaded.spec.mesh_path, e))
+}
+
+type Built = (Compliance, ComplianceChecks, Vec<(&'static str, f64)>);
+
+fn build(loaded: &LoadedPart, ui: &Ui<'_>) -> Result<Built, Error> {
+    let path = &loaded.spec.mesh_path;
+    let progress = ui.progress();
+    let mut seconds = Vec::new();
+    let mut lap = Instant::now();
+    let mut done = |name, seconds: &mut Vec<(&'static str, f64)>| {
+        seconds.push((name, lap.elapsed().as_secs_f64()));
+        lap = Instant::now();
+    };
+    let stiffness = assemble(loaded)?;
+    done("assemble the stiffness", &mut seconds);
+    let factor = FactoredStiffness::new(&stiffness, &loaded.supports, &progress)
+        .map_err(|e| Error::part(path, e))?;
+    done("factor", &mut seconds);
+    let compliance = Compliance::build(&factor, &loaded.candidates, &loaded.rows, &progress)
+        .map_err(|e| Error::part(path, e))?;
+    done("compliance columns", &mut seconds);
+    let checks = compliance
+        .check(&stiffness, &factor)
+        .map_err(|e| Error::part(path, e))?;
+    done("checks", &mut seconds);
+    Ok((compliance, checks, seconds))
+}
+
+/// Hash of all that the compliance depends on.
+fn cache_key(loaded: &LoadedPart) -> [u8; 32] {
+    let mut hash = blake3::Hasher::new();
+    hash.update(&cache::FORMAT.to_le_bytes());
+    hash.update(&loaded.mesh_hash);
+    for x in [
+        loaded.spec.length_scale,
+        loaded.spec.material.young_modulus(),
+        loaded.spec.material.poisson_ratio(),
+    ] {
+        hash.update(&x.to_bits().to_le_bytes());
+    }
+    hash.update(format!("{:?}", loaded.spec.quadrature).as_bytes());
+    for dof in 0..3 * loaded.mesh.n_nodes() {
+        hash.update(&[u8::from(loaded.supports.is_fixed(dof))]);
+    }
+    for nodes in [&loaded.candidates, &loaded.rows] {
+        hash.update(&(nodes.len() as u64).to_le_bytes());
+        hash.update(bytemuck::cast_slice(nodes));
+    }
+    *hash.finalize().as_bytes()
+}

@@ -1,0 +1,275 @@
+//! Results to files: tables, plots, pictures, shapes, and one page that tells it all.
+//!
+//! [`write_all`] turns a [`Run`] into the result folder. Each kind of file has its module; none of
+//! them knows where the numbers came from.
+
+pub mod csv;
+pub mod curve;
+pub mod data;
+mod error;
+pub mod html;
+pub mod mcap_file;
+pub mod plot;
+pub mod render;
+pub mod summary;
+pub mod vtu;
+
+mod font;
+#[cfg(test)]
+mod sample;
+
+use std::path::Path;
+
+pub use curve::Curve;
+pub use data::{
+    CellKind, ContactForce, Effect, Facts, Frame, Handbook, HandbookRow, N_STAGES, Outputs,
+    PaperStage, PartDrawing, Phase, Run, STAGE_NAMES, StepRow, View,
+};
+pub use error::ReportError;
+
+/// Writes the whole result folder of `run` into the existing directory `dir`.
+///
+/// Files: `report.html`, `force-travel.csv`, `force-travel.svg`, `timing.csv`, `step-time.svg`,
+/// `summary.json`, `session.mcap`, and below `frames` for each frame `NN-label.png` (displacement),
+/// `NN-label-stress.png` and `NN-label.vtu`; the larger ones as [`Outputs`] asks.
+///
+/// # Errors
+/// The first file that cannot be made, with its path and the cause.
+pub fn write_all(dir: &Path, run: &Run) -> Result<(), ReportError> {
+    run_is_consistent(run)?;
+    let curve = Curve::of(&run.rows);
+
+    write_file(
+        &dir.join("force-travel.csv"),
+        csv::force_travel(&run.rows).as_bytes(),
+    )?;
+    write_file(&dir.join("timing.csv"), csv::timing(&run.rows).as_bytes())?;
+    let summary = summary::json(run, &curve);
+    write_file(&dir.join("summary.json"), summary.as_bytes())?;
+
+    let force_path = dir.join("force-travel.svg");
+    let force_svg =
+        plot::force_travel(run, &curve).map_err(|e| ReportError::plot(&force_path, e))?;
+    write_file(&force_path, force_svg.as_bytes())?;
+    let time_path = dir.join("step-time.svg");
+    let time_svg = plot::step_time(&run.rows).map_err(|e| ReportError::plot(&time_path, e))?;
+    write_file(&time_path, time_svg.as_bytes())?;
+
+    let frames_dir = dir.join("frames");
+    if !run.frames.is_empty() && (run.outputs.png || run.outputs.vtu) {
+        std::fs::create_dir_all(&frames_dir).map_err(|source| ReportError::Io {
+            path: frames_dir.clone(),
+            source,
+        })?;
+    }
+    let mut pictures = Vec::new();
+    if run.outputs.png {
+        pictures = write_pictures(&frames_dir, run)?;
+    }
+    if run.outputs.vtu {
+        for (idx, frame) in run.frames.iter().enumerate() {
+            let path = frames_dir.join(format!("{}.vtu", frame_stem(idx, frame)));
+            let bytes =
+                vtu::frame(&run.part, frame).map_err(|cause| ReportError::shape(&path, cause))?;
+            write_file(&path, &bytes)?;
+        }
+    }
+    if run.outputs.mcap {
+        let path = dir.join("session.mcap");
+        let bytes = mcap_file::session(run).map_err(|e| ReportError::recording(&path, e))?;
+        write_file(&path, &bytes)?;
+    }
+
+    let page = html::page(
+        run,
+        &curve,
+        &html::Drawings {
+            force_svg,
+            time_svg,
+            pictures,
+        },
+    );
+    write_file(&dir.join("report.html"), page.as_bytes())
+}
+
+/// Name of a frame's files without their ending: its number, then its label in plain letters.
+pub fn frame_stem(idx: usize, frame: &Frame) -> String {
+    let mut stem = format!("{:02}", idx + 1);
+    for word in frame
+        .label
+        .split(|c: char| !c.is_ascii_alphanumeric())
+        .filter(|w| !w.is_empty())
+    {
+        stem.push('-');
+        stem.push_str(&word.to_ascii_lowercase());
+    }
+    stem
+}
+
+/// Draws every frame twice, by displacement and by stress, on scales common to the run.
+fn write_pictures(dir: &Path, run: &Run) -> Result<Vec<html::Picture>, ReportError> {
+    let scene = render::Scene::of(run);
+    let mut pictures = Vec::new();
+    for (idx, frame) in run.frames.iter().enumerate() {
+        let stem = frame_stem(idx, frame);
+        let mut draw = |quantity, name: String| {
+            let path = dir.join(&name);
+            let png = scene
+                .png(&run.part, frame, quantity)
+                .map_err(|cause| ReportError::picture(&path, cause))?;
+            write_file(&path, &png)?;
+            pictures.push(html::Picture {
+                frame: idx,
+                quantity,
+                png,
+            });
+            Ok(())
+        };
+        draw(render::Quantity::Displacement, format!("{stem}.png"))?;
+        if !frame.von_mises.is_empty() {
+            draw(render::Quantity::VonMises, format!("{stem}-stress.png"))?;
+        }
+    }
+    Ok(pictures)
+}
+
+fn write_file(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
+    std::fs::write(path, bytes).map_err(|source| ReportError::Io {
+        path: path.to_path_buf(),
+        source,
+    })
+}
+
+/// Refuses indices and lengths that would end in a panic further down.
+fn run_is_consistent(run: &Run) -> Result<(), ReportError> {
+    let n_nodes = run.part.nodes.len();
+    let bad = |what: String| Err(ReportError::Inconsistent { what });
+    let indices = run
+        .part
+        .triangles
+        .iter()
+        .flatten()
+        .chain(run.part.edges.iter().flatten())
+        .chain(&run.part.cells);
+    if let Some(node) = indices.copied().find(|&node| node as usize >= n_nodes) {
+        return bad(format!(
+            "the drawing of the part names node {node} of {n_nodes}"
+        ));
+    }
+    if !run
+        .part
+        .cells
+        .len()
+        .is_multiple_of(run.part.cell_kind.nodes_per_cell())
+    {
+        return bad(format!(
+            "{} cell nodes are no whole number of cells",
+            run.part.cells.len()
+        ));
+    }
+    for frame in &run.frames {
+        let (u, s) = (frame.displacement.len(), frame.von_mises.len());
+        if u != n_nodes || (s != n_nodes && s != 0) {
+            return bad(format!(
+                "frame {:?} has {u} displacements and {s} stresses for {n_nodes} nodes",
+                frame.label
+            ));
+        }
+        if let Some(contact) = frame.contacts.iter().find(|c| c.node as usize >= n_nodes) {
+            let node = contact.node;
+            return bad(format!(
+                "frame {:?} has a contact at node {node}",
+                frame.label
+            ));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may fail by panic")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_folder_is_complete() {
+        let dir = tempfile::tempdir().unwrap();
+        let run = sample::run();
+        write_all(dir.path(), &run).unwrap();
+        let mut files: Vec<String> = Vec::new();
+        for folder in [dir.path().to_path_buf(), dir.path().join("frames")] {
+            for entry in std::fs::read_dir(folder).unwrap() {
+                let entry = entry.unwrap();
+                if entry.file_type().unwrap().is_file() {
+                    assert!(entry.metadata().unwrap().len() > 0);
+                    files.push(entry.file_name().into_string().unwrap());
+                }
+            }
+        }
+        files.sort();
+        assert_eq!(
+            files,
+            [
+                "01-first-contact-stress.png",
+                "01-first-contact.png",
+                "01-first-contact.vtu",
+                "02-peak-stress.png",
+                "02-peak.png",
+                "02-peak.vtu",
+                "force-travel.csv",
+                "force-travel.svg",
+                "report.html",
+                "session.mcap",
+                "step-time.svg",
+                "summary.json",
+                "timing.csv",
+            ]
+        );
+    }
+
+    #[test]
+    fn an_empty_run_still_makes_a_report() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut run = sample::run();
+        run.rows.clear();
+        run.frames.clear();
+        write_all(dir.path(), &run).unwrap();
+        assert!(dir.path().join("report.html").exists());
+    }
+
+    #[test]
+    fn numbers_that_are_not_finite_do_no_harm() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut run = sample::run();
+        run.rows[3].force_n = f64::NAN;
+        run.rows[4].certificate = f64::INFINITY;
+        run.frames[0].displacement[0].x = f64::NAN;
+        run.frames[1].von_mises[2] = f64::INFINITY;
+        write_all(dir.path(), &run).unwrap();
+    }
+
+    #[test]
+    fn a_missing_folder_is_named() {
+        let dir = tempfile::tempdir().unwrap();
+        let error = write_all(&dir.path().join("gone"), &sample::run())
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("gone"), "{error}");
+        assert!(error.contains("force-travel.csv"), "{error}");
+    }
+
+    #[test]
+    fn a_wrong_index_is_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut run = sample::run();
+        run.part.triangles.push([0, 1, 9_999]);
+        let error = write_all(dir.path(), &run).unwrap_err().to_string();
+        assert_eq!(
+            error,
+            format!(
+                "the drawing of the part names node 9999 of {}",
+                run.part.nodes.len()
+            )
+        );
+    }
+}

@@ -1,0 +1,397 @@
+//! Pictures of the deformed part, drawn by the processor alone: no display, no graphics card.
+//!
+//! Parallel projection, depth buffer, one light at the eye's shoulder, each pixel the mean of
+//! 2 x 2 samples. The shape is to scale, never exaggerated.
+
+mod camera;
+mod canvas;
+mod colour;
+mod overlay;
+mod surface;
+
+use glam::DVec3;
+
+use self::camera::Camera;
+use self::canvas::{Canvas, Layer};
+use self::overlay::{ColourBar, Overlay};
+use self::surface::Surface;
+use super::data::{Frame, PartDrawing, Run};
+use super::plot::short;
+
+/// Width and height of a picture, pixels.
+pub const SIZE: (usize, usize) = (1280, 960);
+
+/// Samples per pixel along each axis.
+const SAMPLES: usize = 2;
+
+/// Where the part goes in the picture, pixels: left, top, right, bottom.
+const STAGE: [f64; 4] = [70.0, 120.0, 1090.0, 870.0];
+
+/// Length of the longest arrow, pixels.
+const ARROW: f64 = 120.0;
+
+/// Share of the surface nodes whose stress lies within the colour scale. The few beyond it sit at
+/// contact points and clamped edges, where the exact solution has no bound.
+const STRESS_SHARE: f64 = 0.995;
+
+/// What the colours show.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Length of the displacement, mm.
+    Displacement,
+    /// Von Mises stress, MPa.
+    VonMises,
+}
+
+/// What all pictures of a run share, so that they can be compared and played one after another:
+/// camera, colour scales, scale of the arrows.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    title: String,
+    camera: Camera,
+    /// Top of the colour scale, m.
+    displacement_top: f64,
+    /// Top of the colour scale, Pa.
+    stress_top: f64,
+    /// Largest contact force of all frames, N.
+    force_max: f64,
+    /// Surface nodes, sorted.
+    surface_nodes: Vec<u32>,
+}
+
+impl Scene {
+    /// Fits camera and scales to all frames of the run.
+    pub fn of(run: &Run) -> Self {
+        let mut surface_nodes: Vec<u32> = run.part.triangles.iter().flatten().copied().collect();
+        surface_nodes.sort_unstable();
+        surface_nodes.dedup();
+        let part = &run.part;
+        let mut points: Vec<DVec3> = surface_nodes
+            .iter()
+            .map(|&node| part.nodes[node as usize])
+            .collect();
+        let (mut displacement_top, mut stress_top, mut force_max) = (0f64, 0f64, 0f64);
+        for frame in &run.frames {
+            let moved = surface_nodes.iter().map(|&node| {
+                let node = node as usize;
+                part.nodes[node] + frame.displacement[node]
+            });
+            points.extend(moved.filter(|p| p.is_finite()));
+            let lengths = surface_nodes
+                .iter()
+                .map(|&n| frame.displacement[n as usize].length());
+            displacement_top = finite(lengths).fold(displacement_top, f64::max);
+            if !frame.von_mises.is_empty() {
+                let stresses = surface_nodes.iter().map(|&n| frame.von_mises[n as usize]);
+                stress_top = stress_top.max(quantile(finite(stresses).collect(), STRESS_SHARE));
+            }
+            force_max =
+                finite(frame.contacts.iter().map(|c| c.force.length())).fold(force_max, f64::max);
+        }
+        // The tool as far as it is near the part: a long pin may leave the picture.
+        let (low, high) = bounds(&points);
+        let reach = 0.45 * (high - low).length();
+        let corners = run
+            .frames
+            .iter()
+            .flat_map(|frame| frame.tool.iter().flatten());
+        let near: Vec<DVec3> = corners
+            .filter(|p| p.is_finite())
+            .map(|p| p.clamp(low - DVec3::splat(reach), high + DVec3::splat(reach)))
+            .collect();
+        points.extend(near);
+        Self {
+            title: run.title.clone(),
+            camera: Camera::fit(&run.view, &points, STAGE.map(|v| v * SAMPLES as f64)),
+            displacement_top,
+            stress_top,
+            force_max,
+            surface_nodes,
+        }
+    }
+
+    /// One frame as the bytes of a PNG file.
+    ///
+    /// # Errors
+    /// What the encoder says.
+    pub fn png(
+        &self,
+        part: &PartDrawing,
+        frame: &Frame,
+        quantity: Quantity,
+    ) -> Result<Vec<u8>, String> {
+        encode(&self.pixels(part, frame, quantity)?)
+    }
+
+    /// The picture, three bytes per pixel, rows from the top.
+    fn pixels(
+        &self,
+        part: &PartDrawing,
+        frame: &Frame,
+        quantity: Quantity,
+    ) -> Result<Vec<u8>, String> {
+        let (width, height) = (SIZE.0 * SAMPLES, SIZE.1 * SAMPLES);
+        let (unit, factor, top, values): (_, _, _, Vec<f64>) = match quantity {
+            Quantity::Displacement => {
+                let lengths = frame
+                    .displacement
+                    .iter()
+                    .map(|u| u.length() * 1e3)
+                    .collect();
+                ("mm", 1e3, self.displacement_top, lengths)
+            }
+            Quantity::VonMises => {
+                let stress = frame.von_mises.iter().map(|s| s / 1e6).collect();
+                ("MPa", 1e-6, self.stress_top, stress)
+            }
+        };
+        let name = match quantity {
+            Quantity::Displacement => "displacement",
+            Quantity::VonMises => "von Mises stress",
+        };
+        let bar = ColourBar::new(name, unit, top * factor);
+
+        let mut canvas = Canvas::new(width, height);
+        let nodes: Vec<DVec3> = part
+            .nodes
+            .iter()
+            .zip(&frame.displacement)
+            .map(|(&p, &u)| p + u)
+            .collect();
+        let body = Surface::new(nodes, part.triangles.clone());
+        let shades: Vec<f32> = values.iter().map(|&v| (v / bar.top) as f32).collect();
+        self.draw_part(&mut canvas.solid, &body, part, &shades);
+        let tool = Surface::welded(&frame.tool);
+        self.draw_tool(&mut canvas.glass, &tool);
+        canvas.lay_glass_over_solid();
+        self.draw_arrows(&mut canvas.solid, frame);
+
+        let mut picture = Overlay::new(canvas.bytes(), SIZE, SAMPLES);
+        let force = frame
+            .contacts
+            .iter()
+            .map(|c| c.force)
+            .sum::<DVec3>()
+            .length();
+        let moment = format!(
+            "{}    travel {} mm    force {} N    step {}",
+            frame.label,
+            short(frame.travel_m * 1e3),
+            short(frame.force_n),
+            frame.step,
+        );
+        picture.text(&self.title, (40, 30), 32);
+        picture.text(&moment, (40, 74), 22);
+        let largest =
+            finite(self.surface_nodes.iter().map(|&n| values[n as usize])).fold(0.0, f64::max);
+        picture.colour_bar(&bar, largest);
+        picture.axes(&self.camera);
+        picture.scale_bar(self.camera.pixels_per_metre() / SAMPLES as f64);
+        let arrows = if frame.contacts.is_empty() {
+            "no contact".to_owned()
+        } else {
+            format!(
+                "arrows: {} contact forces on the part, longest {} N, resultant {} N",
+                frame.contacts.len(),
+                short(finite(frame.contacts.iter().map(|c| c.force.length())).fold(0.0, f64::max)),
+                short(force),
+            )
+        };
+        picture.text(&format!("shape to scale    {arrows}"), (330, 916), 19);
+        Ok(averaged(&picture.finish()?, SIZE, SAMPLES))
+    }
+
+    fn draw_part(&self, layer: &mut Layer, body: &Surface, part: &PartDrawing, shades: &[f32]) {
+        let map = colour::map();
+        let projected = self.camera.project_all(&body.nodes);
+        for (triangle_idx, triangle) in body.triangles.iter().enumerate() {
+            let corners = triangle.map(|n| projected[n as usize]);
+            let value = triangle.map(|n| shades[n as usize]);
+            let light = body.corner_normals[triangle_idx].map(|n| self.camera.light(n) as f32);
+            layer.triangle(corners, |weights| {
+                let mix = |v: [f32; 3]| v[0] * weights[0] + v[1] * weights[1] + v[2] * weights[2];
+                let lit = mix(light);
+                (colour::at(&map, mix(value)).map(|c| c * lit), 1.0)
+            });
+        }
+        for edge in &part.edges {
+            for pair in edge.windows(2) {
+                let ends = [projected[pair[0] as usize], projected[pair[1] as usize]];
+                layer.line(ends, 1.5, [0.06, 0.07, 0.10], 0.42);
+            }
+        }
+        for pair in &body.creases {
+            layer.line(
+                pair.map(|n| projected[n as usize]),
+                2.6,
+                [0.05, 0.06, 0.09],
+                0.85,
+            );
+        }
+    }
+
+    fn draw_tool(&self, layer: &mut Layer, tool: &Surface) {
+        let projected = self.camera.project_all(&tool.nodes);
+        for (triangle, normals) in tool.triangles.iter().zip(&tool.corner_normals) {
+            let light = normals.map(|n| self.camera.light(n) as f32);
+            // Glass is seen best where it is grazed.
+            let facing = normals.map(|n| self.camera.facing(n) as f32);
+            layer.triangle(triangle.map(|n| projected[n as usize]), |weights| {
+                let mix = |v: [f32; 3]| v[0] * weights[0] + v[1] * weights[1] + v[2] * weights[2];
+                let grazing = 1.0 - mix(facing);
+                let lit = mix(light);
+                (
+                    [0.74 * lit, 0.77 * lit, 0.81 * lit],
+                    0.38 + 0.4 * grazing * grazing,
+                )
+            });
+        }
+        for pair in &tool.creases {
+            layer.line(
+                pair.map(|n| projected[n as usize]),
+                2.4,
+                [0.35, 0.38, 0.42],
+                0.9,
+            );
+        }
+    }
+
+    /// Arrows end at the contact points. They lie over everything: a force that is hidden by the
+    /// part is still a force.
+    fn draw_arrows(&self, layer: &mut Layer, frame: &Frame) {
+        if self.force_max <= 0.0 {
+            return;
+        }
+        let metres_per_newton =
+            ARROW * SAMPLES as f64 / self.camera.pixels_per_metre() / self.force_max;
+        let mut arrows: Vec<[[f64; 3]; 2]> = frame
+            .contacts
+            .iter()
+            .map(|c| {
+                let tail = c.point - c.force * metres_per_newton;
+                [self.camera.project(tail), self.camera.project(c.point)]
+            })
+            .filter(|ends| ends.iter().flatten().all(|v| v.is_finite()))
+            .collect();
+        arrows.sort_by(|a, b| b[1][2].total_cmp(&a[1][2]));
+        for ends in arrows {
+            layer.arrow(ends, [0.80, 0.10, 0.32]);
+        }
+    }
+}
+
+fn finite(values: impl Iterator<Item = f64>) -> impl Iterator<Item = f64> {
+    values.filter(|v| v.is_finite())
+}
+
+/// Value that the given share does not exceed; 0 of nothing.
+fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let rank = (values.len() as f64 * share).ceil() as usize;
+    values.get(rank.max(1) - 1).copied().unwrap_or(0.0)
+}
+
+fn bounds(points: &[DVec3]) -> (DVec3, DVec3) {
+    let first = points.first().copied().unwrap_or_default();
+    points
+        .iter()
+        .fold((first, first), |(low, high), &p| (low.min(p), high.max(p)))
+}
+
+/// Mean of the `samples` x `samples` samples of each pixel of a picture of this size.
+fn averaged(bytes: &[u8], (width, height): (usize, usize), samples: usize) -> Vec<u8> {
+    let mut pixels = Vec::with_capacity(3 * width * height);
+    let n = (samples * samples) as u32;
+    for row in 0..height {
+        for column in 0..width {
+            let mut sum = [n / 2; 3];
+            for y in row * samples..(row + 1) * samples {
+                let from = 3 * (y * width + column) * samples;
+                for sample in bytes[from..from + 3 * samples].chunks_exact(3) {
+                    for (s, &b) in sum.iter_mut().zip(sample) {
+                        *s += u32::from(b);
+                    }
+                }
+            }
+            pixels.extend(sum.map(|s| (s / n) as u8));
+        }
+    }
+    pixels
+}
+
+fn encode(pixels: &[u8]) -> Result<Vec<u8>, String> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, SIZE.0 as u32, SIZE.1 as u32);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::Balanced);
+    let mut writer = encoder.write_header().map_err(|e| e.to_string())?;
+    writer.write_image_data(pixels).map_err(|e| e.to_string())?;
+    writer.finish().map_err(|e| e.to_string())?;
+    Ok(bytes)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may fail by panic")]
+mod tests {
+    use super::super::sample;
+    use super::*;
+
+    #[test]
+    fn a_picture_shows_the_part_in_its_colours() {
+        let run = sample::run();
+        let scene = Scene::of(&run);
+        let pixels = scene
+            .pixels(&run.part, &run.frames[1], Quantity::Displacement)
+            .unwrap();
+        assert_eq!(pixels.len(), SIZE.0 * SIZE.1 * 3);
+        let stage = (STAGE[1] as usize..STAGE[3] as usize)
+            .flat_map(|y| (STAGE[0] as usize..STAGE[2] as usize).map(move |x| (x, y)));
+        let coloured = stage
+            .filter(|&(x, y)| {
+                let p = &pixels[3 * (y * SIZE.0 + x)..][..3];
+                p.iter().max().unwrap() - p.iter().min().unwrap() > 40
+            })
+            .count();
+        assert!(coloured > 50_000, "{coloured}");
+    }
+
+    #[test]
+    fn a_png_reads_back() {
+        let run = sample::run();
+        let scene = Scene::of(&run);
+        let bytes = scene
+            .png(&run.part, &run.frames[0], Quantity::VonMises)
+            .unwrap();
+        let decoder = png::Decoder::new(std::io::Cursor::new(bytes));
+        let info = decoder.read_info().unwrap();
+        assert_eq!((info.info().width, info.info().height), (1280, 960));
+    }
+
+    #[test]
+    fn nothing_to_draw_is_an_empty_stage() {
+        let mut run = sample::run();
+        run.part = PartDrawing::default();
+        run.frames = vec![Frame::default()];
+        let scene = Scene::of(&run);
+        scene
+            .png(&run.part, &run.frames[0], Quantity::Displacement)
+            .unwrap();
+    }
+
+    #[test]
+    fn pixels_are_the_mean_of_their_samples() {
+        let bytes: Vec<u8> = (0..4u8)
+            .flat_map(|row| (0..4u8).flat_map(move |c| [row, c * 10, 7]))
+            .collect();
+        let pixels = averaged(&bytes, (2, 2), 2);
+        assert_eq!(pixels, [1, 5, 7, 1, 25, 7, 3, 5, 7, 3, 25, 7]);
+    }
+
+    #[test]
+    fn quantiles() {
+        assert_eq!(quantile((1..=1000).map(f64::from).collect(), 0.995), 995.0);
+        assert_eq!(quantile(vec![3.0], 0.995), 3.0);
+        assert_eq!(quantile(vec![], 0.995), 0.0);
+    }
+}

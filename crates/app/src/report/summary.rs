@@ -1,0 +1,270 @@
+//! `summary.json`: the numbers of a run for other programs. Key names are relied upon.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::curve::Curve;
+use super::data::{Run, STAGE_NAMES, StepRow};
+
+/// Order statistics of one stage's time, µs.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Percentiles {
+    /// Median.
+    pub p50: f64,
+    /// 99 % of the steps took no longer.
+    pub p99: f64,
+    /// 99.9 % of the steps took no longer.
+    pub p999: f64,
+    /// The longest.
+    pub max: f64,
+}
+
+impl Percentiles {
+    /// Exact, by sorting: the smallest value that at least the asked share does not exceed. `None`
+    /// for no values.
+    pub fn of_ns(times_ns: impl Iterator<Item = u64>) -> Option<Self> {
+        let mut sorted: Vec<u64> = times_ns.collect();
+        sorted.sort_unstable();
+        let max = *sorted.last()?;
+        // In thousandths, because 0.999 * n is not exact.
+        let at = |thousandths: usize| {
+            let rank = (sorted.len() * thousandths).div_ceil(1000).max(1);
+            sorted[rank - 1] as f64 / 1e3
+        };
+        Some(Self {
+            p50: at(500),
+            p99: at(990),
+            p999: at(999),
+            max: max as f64 / 1e3,
+        })
+    }
+}
+
+/// Time statistics by stage, in the order of the stages, then `multiply` if any step did it, then
+/// `total`.
+pub fn stage_percentiles(rows: &[StepRow]) -> Vec<(&'static str, Percentiles)> {
+    let mut stages = Vec::new();
+    let mut push = |name, times: Option<Percentiles>| {
+        if let Some(times) = times {
+            stages.push((name, times));
+        }
+    };
+    for (stage_idx, name) in STAGE_NAMES.into_iter().enumerate() {
+        push(
+            name,
+            Percentiles::of_ns(rows.iter().map(|row| row.stage_ns[stage_idx])),
+        );
+    }
+    push(
+        "multiply",
+        Percentiles::of_ns(rows.iter().filter_map(|row| row.multiply_ns)),
+    );
+    push(
+        "total",
+        Percentiles::of_ns(rows.iter().map(|row| row.total_ns)),
+    );
+    stages
+}
+
+#[derive(Serialize)]
+#[expect(
+    non_snake_case,
+    reason = "keys of the file carry their unit in its own letters"
+)]
+struct Summary<'a> {
+    peak_insertion_force_N: f64,
+    travel_at_peak_m: f64,
+    snap_drop_N: f64,
+    snap_travel_m: Option<f64>,
+    retention_force_N: Option<f64>,
+    insertion_work_J: f64,
+    net_work_J: f64,
+    coupling_stiffness_N_per_m: Option<f64>,
+    max_principal_strain: f64,
+    max_rotation_deg: f64,
+    max_certificate: f64,
+    max_wrench_mismatch_rel: f64,
+    nodes: usize,
+    elements: usize,
+    order: u32,
+    surface_nodes: usize,
+    max_contacts: u32,
+    steps: usize,
+    missed_deadlines: u64,
+    step_us: BTreeMap<&'static str, Percentiles>,
+    prepare_s: f64,
+    effects: BTreeMap<&'a str, EffectSummary<'a>>,
+}
+
+#[derive(Serialize)]
+struct EffectSummary<'a> {
+    on: bool,
+    number: Option<f64>,
+    threshold: f64,
+    why: &'a str,
+}
+
+/// The text of `summary.json`. Numbers that are not finite become `null`.
+pub fn json(run: &Run, curve: &Curve) -> String {
+    let facts = &run.facts;
+    let summary = Summary {
+        peak_insertion_force_N: curve.peak_force_n,
+        travel_at_peak_m: curve.travel_at_peak_m,
+        snap_drop_N: curve.snap_drop_n,
+        snap_travel_m: curve.snap_travel_m,
+        retention_force_N: curve.retention_force_n,
+        insertion_work_J: curve.insertion_work_j,
+        net_work_J: curve.net_work_j,
+        coupling_stiffness_N_per_m: facts.coupling_stiffness,
+        max_principal_strain: facts.max_principal_strain,
+        max_rotation_deg: facts.max_rotation_deg,
+        max_certificate: max_certificate(&run.rows),
+        max_wrench_mismatch_rel: largest(run.rows.iter().map(|row| row.wrench_mismatch_rel)),
+        nodes: facts.nodes,
+        elements: facts.elements,
+        order: facts.order,
+        surface_nodes: facts.surface_nodes,
+        max_contacts: run.rows.iter().map(|row| row.contacts).max().unwrap_or(0),
+        steps: run.rows.len(),
+        missed_deadlines: facts.missed_deadlines,
+        step_us: stage_percentiles(&run.rows).into_iter().collect(),
+        prepare_s: facts.prepare_s,
+        effects: run
+            .effects
+            .iter()
+            .map(|effect| {
+                let &super::Effect {
+                    on,
+                    number,
+                    threshold,
+                    ref why,
+                    ..
+                } = effect;
+                (
+                    effect.name.as_str(),
+                    EffectSummary {
+                        on,
+                        number,
+                        threshold,
+                        why,
+                    },
+                )
+            })
+            .collect(),
+    };
+    // Plain numbers, strings and maps with string keys: there is nothing to refuse.
+    let mut text = serde_json::to_string_pretty(&summary).unwrap_or_default();
+    text.push('\n');
+    text
+}
+
+/// Worst certificate of all steps; not a number if any step's is not.
+pub fn max_certificate(rows: &[StepRow]) -> f64 {
+    largest(rows.iter().map(|row| row.certificate))
+}
+
+/// Largest of `values`, or NaN if one of them is: a broken step must not hide behind a good one.
+fn largest(values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(0.0, |max, value| {
+        if value.is_nan() || value > max {
+            value
+        } else {
+            max
+        }
+    })
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may fail by panic")]
+mod tests {
+    use super::super::sample;
+    use super::*;
+
+    #[test]
+    fn percentiles_are_exact() {
+        let times = Percentiles::of_ns((1..=1000).rev().map(|i| i * 1000)).unwrap();
+        assert_eq!(
+            times,
+            Percentiles {
+                p50: 500.0,
+                p99: 990.0,
+                p999: 999.0,
+                max: 1000.0
+            }
+        );
+        let one = Percentiles::of_ns([7_500].into_iter()).unwrap();
+        assert_eq!(
+            one,
+            Percentiles {
+                p50: 7.5,
+                p99: 7.5,
+                p999: 7.5,
+                max: 7.5
+            }
+        );
+        assert_eq!(Percentiles::of_ns(std::iter::empty()), None);
+    }
+
+    #[test]
+    fn the_agreed_keys_are_there() {
+        let run = sample::run();
+        let text = json(&run, &Curve::of(&run.rows));
+        let value: serde_json::Value = serde_json::from_str(&text).unwrap();
+        for key in [
+            "peak_insertion_force_N",
+            "travel_at_peak_m",
+            "snap_drop_N",
+            "snap_travel_m",
+            "retention_force_N",
+            "insertion_work_J",
+            "net_work_J",
+            "coupling_stiffness_N_per_m",
+            "max_principal_strain",
+            "max_rotation_deg",
+            "max_certificate",
+            "max_wrench_mismatch_rel",
+            "nodes",
+            "elements",
+            "order",
+            "surface_nodes",
+            "max_contacts",
+            "steps",
+            "missed_deadlines",
+            "step_us",
+            "prepare_s",
+            "effects",
+        ] {
+            assert!(!value[key].is_null(), "{key}");
+        }
+        assert_eq!(value["steps"], 900);
+        for stage in STAGE_NAMES.into_iter().chain(["multiply", "total"]) {
+            for key in ["p50", "p99", "p999", "max"] {
+                assert!(value["step_us"][stage][key].is_f64(), "{stage} {key}");
+            }
+        }
+        assert_eq!(value["effects"]["friction"]["number"], 0.3);
+        assert_eq!(
+            value["effects"]["gravity"]["number"],
+            serde_json::Value::Null
+        );
+        assert_eq!(value["effects"]["gravity"]["on"], false);
+    }
+
+    #[test]
+    fn a_part_not_pulled_out_has_a_null_retention_force() {
+        let mut run = sample::run();
+        run.rows.truncate(500);
+        let value: serde_json::Value =
+            serde_json::from_str(&json(&run, &Curve::of(&run.rows))).unwrap();
+        assert!(value["retention_force_N"].is_null());
+        assert!(value.as_object().unwrap().contains_key("retention_force_N"));
+    }
+
+    #[test]
+    fn one_broken_certificate_is_not_hidden() {
+        let mut rows = sample::rows();
+        rows[3].certificate = f64::NAN;
+        assert!(max_certificate(&rows).is_nan());
+    }
+}

@@ -1,0 +1,800 @@
+//! The scene as written: every key with its place in the file, nothing checked but types.
+//!
+//! The doc comments of the fields here are the text of `docs/scene.md` and of the JSON Schema.
+//! `x-quantity` names a row of the unit table; defaults are in SI whatever the file's units.
+
+use std::fmt;
+use std::path::Path;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{self, Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
+
+use super::error::{SceneError, line_of, plain, suggestion};
+use super::{DeviceModel, Handle, QuadratureRule, Units};
+
+/// Values of keys that are not written.
+pub(super) mod default {
+    pub(crate) const HAND_MASS: f64 = 0.5;
+    pub(crate) const HAND_STIFFNESS: f64 = 2000.0;
+    pub(crate) const HAND_DAMPING: f64 = 63.0;
+    pub(crate) const HAND_ROTATIONAL_INERTIA: f64 = 1e-3;
+    pub(crate) const HAND_ROTATIONAL_STIFFNESS: f64 = 20.0;
+    pub(crate) const HAND_ROTATIONAL_DAMPING: f64 = 0.28;
+    pub(crate) const COUPLING_TRANSLATIONAL_STIFFNESS: f64 = 1e4;
+    pub(crate) const COUPLING_ROTATIONAL_STIFFNESS: f64 = 20.0;
+    pub(crate) const SERVO_PERIOD: f64 = 1e-3;
+    pub(crate) const LCP_TOLERANCE: f64 = 1e-10;
+    pub(crate) const MAX_CONTACTS: i64 = 500;
+    pub(crate) const FRAMES: i64 = 6;
+}
+
+/// A value and where it stands.
+#[derive(Clone, Debug)]
+pub(super) struct At<T> {
+    pub(super) value: T,
+    /// Byte offset in the file.
+    pub(super) offset: usize,
+}
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for At<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let spanned = toml::Spanned::<T>::deserialize(deserializer)?;
+        Ok(Self {
+            offset: spanned.span().start,
+            value: spanned.into_inner(),
+        })
+    }
+}
+
+impl<T: JsonSchema> JsonSchema for At<T> {
+    fn inline_schema() -> bool {
+        T::inline_schema()
+    }
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        T::schema_name()
+    }
+    fn schema_id() -> std::borrow::Cow<'static, str> {
+        T::schema_id()
+    }
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        T::json_schema(generator)
+    }
+}
+
+/// So many numbers and no more: serde's own arrays drop what is too much.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Vector<const N: usize>(pub(super) [f64; N]);
+
+impl<'de, const N: usize> Deserialize<'de> for Vector<N> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let numbers = Vec::<f64>::deserialize(deserializer)?;
+        let expected = format!("{N} numbers");
+        let vector = numbers.as_slice().try_into();
+        let vector = vector.map_err(|_| de::Error::invalid_length(numbers.len(), &&*expected))?;
+        Ok(Self(vector))
+    }
+}
+
+impl<const N: usize> JsonSchema for Vector<N>
+where
+    [f64; N]: JsonSchema,
+{
+    fn inline_schema() -> bool {
+        <[f64; N]>::inline_schema()
+    }
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        <[f64; N]>::schema_name()
+    }
+    fn schema_id() -> std::borrow::Cow<'static, str> {
+        <[f64; N]>::schema_id()
+    }
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        <[f64; N]>::json_schema(generator)
+    }
+}
+
+/// A part, a tool that is pushed onto it, and the hand that pushes.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "snapin scene")]
+pub(super) struct SceneRaw {
+    /// Title for reports and windows.
+    #[schemars(extend("x-default" = "the file's name"))]
+    pub(super) title: Option<String>,
+    /// Units of every number in the scene and of the mesh's coordinates.
+    #[serde(default)]
+    pub(super) units: Units,
+    /// The deformable part.
+    pub(super) part: PartRaw,
+    /// The rigid tool that meets the part. It has its own frame, which `position` and `axis` or
+    /// `rotation` place in the part's frame (the mesh's).
+    pub(super) tool: At<ToolRaw>,
+    /// Which of the two bodies the hand holds; the other one is fixed in the world.
+    #[serde(default)]
+    pub(super) holds: HoldsRaw,
+    /// The scripted hand of runs without a device: its target goes along `direction` at `speed`,
+    /// rests, and comes back if told; the handle follows it as a mass on a spring and a damper.
+    /// The defaults are an assumption: the orders of magnitude of a firm grip, not measured ones.
+    pub(super) hand: At<HandRaw>,
+    /// The spring between the handle and the body that it holds. Soft hides stiff clips; the
+    /// measured curve is that of clip and coupling in series.
+    #[serde(default)]
+    pub(super) coupling: CouplingRaw,
+    /// The haptic device.
+    #[serde(default)]
+    pub(super) device: DeviceRaw,
+    /// What accuracy costs time, and how much of it is asked for.
+    #[serde(default)]
+    pub(super) accuracy: AccuracyRaw,
+    /// Effects beyond the small-strain, frictionless, quasi-static model. `"off"`: not looked at.
+    /// `"auto"`: its size is estimated and told. `"on"`: simulated, which this version cannot.
+    #[serde(default)]
+    pub(super) effects: EffectsRaw,
+    /// Which results are written.
+    #[serde(default)]
+    pub(super) output: OutputRaw,
+    /// Dimensions of a plain cantilever hook, for a comparison with the snap-fit handbooks.
+    /// Leave the section out for any other part.
+    pub(super) handbook: Option<HandbookRaw>,
+}
+
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PartRaw {
+    /// Gmsh mesh (`.msh`, version 4.1, ASCII or binary) of tetrahedra, relative to the scene file.
+    pub(super) mesh: At<String>,
+    /// Order of the elements, 1, 2 or 3. This version does not change a mesh's order: another
+    /// one than the mesh's own is refused.
+    #[schemars(range(min = 1, max = 3), extend("x-default" = "the mesh's own"))]
+    pub(super) order: Option<At<i64>>,
+    /// Material of the part; may be its own section `[part.material]`.
+    pub(super) material: MaterialRaw,
+    /// What is held: the name of a physical group of the mesh, or a list of names and of tables
+    /// with `group` and `components`, such as `{ group = "symmetry", components = ["x"] }`.
+    pub(super) fixed: At<FixedRaw>,
+    /// What can touch the tool: the name of a physical group, or a list of names.
+    pub(super) contact: At<NamesRaw>,
+    /// Rule for the element integrals.
+    #[serde(default)]
+    pub(super) quadrature: QuadratureRule,
+}
+
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct MaterialRaw {
+    /// Name for reports.
+    pub(super) name: Option<String>,
+    /// Young's modulus, above 0.
+    #[schemars(extend("x-quantity" = "pressure"))]
+    pub(super) young_modulus: At<f64>,
+    /// Poisson's ratio, above -1 and below 0.5; 0.499 for rubber-like parts.
+    #[schemars(extend("x-quantity" = "number"))]
+    pub(super) poisson_ratio: At<f64>,
+    /// Density, above 0; needed for the size of gravity and of the part's inertia.
+    #[schemars(extend("x-quantity" = "density"))]
+    pub(super) density: Option<At<f64>>,
+    /// Largest strain that the material bears once, such as 0.02; the report compares with it.
+    #[schemars(extend("x-quantity" = "number"))]
+    pub(super) permissible_strain: Option<At<f64>>,
+}
+
+/// What is held: one group or several.
+#[derive(Debug)]
+pub(super) struct FixedRaw(pub(super) Vec<At<FixedEntry>>);
+
+/// One held group.
+#[derive(Debug)]
+pub(super) struct FixedEntry {
+    pub(super) group: String,
+    /// `None`: all.
+    pub(super) components: Option<At<Vec<At<Component>>>>,
+}
+
+/// A direction of the part's frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Component {
+    X,
+    Y,
+    Z,
+}
+
+impl<'de> Deserialize<'de> for FixedEntry {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        #[derive(serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Table {
+            group: String,
+            components: Option<At<Vec<At<Component>>>>,
+        }
+        struct Entry;
+        impl<'de> Visitor<'de> for Entry {
+            type Value = FixedEntry;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a group name or a table with `group` and `components`")
+            }
+            fn visit_str<E: de::Error>(self, name: &str) -> Result<FixedEntry, E> {
+                Ok(FixedEntry {
+                    group: name.to_owned(),
+                    components: None,
+                })
+            }
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<FixedEntry, A::Error> {
+                let table = Table::deserialize(MapAccessDeserializer::new(map))?;
+                Ok(FixedEntry {
+                    group: table.group,
+                    components: table.components,
+                })
+            }
+        }
+        deserializer.deserialize_any(Entry)
+    }
+}
+
+impl<'de> Deserialize<'de> for FixedRaw {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Entries;
+        impl<'de> Visitor<'de> for Entries {
+            type Value = FixedRaw;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a group name, or a list of group names and of tables with `group`")
+            }
+            fn visit_str<E: de::Error>(self, name: &str) -> Result<FixedRaw, E> {
+                let entry = FixedEntry {
+                    group: name.to_owned(),
+                    components: None,
+                };
+                // The offset of the whole value is known outside; see `validate`.
+                Ok(FixedRaw(vec![At {
+                    value: entry,
+                    offset: 0,
+                }]))
+            }
+            fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<FixedRaw, A::Error> {
+                let mut entries = Vec::new();
+                while let Some(entry) = seq.next_element()? {
+                    entries.push(entry);
+                }
+                Ok(FixedRaw(entries))
+            }
+        }
+        deserializer.deserialize_any(Entries)
+    }
+}
+
+impl JsonSchema for FixedRaw {
+    fn inline_schema() -> bool {
+        true
+    }
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Fixed".into()
+    }
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "x-type": "name or list",
+            "anyOf": [
+                { "type": "string" },
+                {
+                    "type": "array",
+                    "minItems": 1,
+                    "items": {
+                        "anyOf": [
+                            { "type": "string" },
+                            {
+                                "type": "object",
+                                "properties": {
+                                    "group": { "type": "string" },
+                                    "components": {
+                                        "type": "array",
+                                        "minItems": 1,
+                                        "items": { "type": "string", "enum": ["x", "y", "z"] }
+                                    }
+                                },
+                                "required": ["group"],
+                                "additionalProperties": false
+                            }
+                        ]
+                    }
+                }
+            ]
+        })
+    }
+}
+
+/// One name or several.
+#[derive(Debug)]
+pub(super) struct NamesRaw(pub(super) Vec<At<String>>);
+
+impl<'de> Deserialize<'de> for NamesRaw {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Names;
+        impl<'de> Visitor<'de> for Names {
+            type Value = NamesRaw;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a group name or a list of group names")
+            }
+            fn visit_str<E: de::Error>(self, name: &str) -> Result<NamesRaw, E> {
+                Ok(NamesRaw(vec![At {
+                    value: name.to_owned(),
+                    offset: 0,
+                }]))
+            }
+            fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<NamesRaw, A::Error> {
+                let mut names = Vec::new();
+                while let Some(name) = seq.next_element()? {
+                    names.push(name);
+                }
+                Ok(NamesRaw(names))
+            }
+        }
+        deserializer.deserialize_any(Names)
+    }
+}
+
+impl JsonSchema for NamesRaw {
+    fn inline_schema() -> bool {
+        true
+    }
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Names".into()
+    }
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "x-type": "name or list",
+            "anyOf": [
+                { "type": "string" },
+                { "type": "array", "minItems": 1, "items": { "type": "string" } }
+            ]
+        })
+    }
+}
+
+/// Shape of the tool.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum ShapeRaw {
+    /// about local z.
+    Cylinder,
+    /// about the origin.
+    Sphere,
+    /// about the origin.
+    Box,
+    /// a tube about local z with round ends.
+    Capsule,
+    /// all below local z = 0.
+    HalfSpace,
+    /// a closed surface from a file.
+    Mesh,
+}
+
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ToolRaw {
+    /// Shape; a key that does not belong to it is an error.
+    pub(super) shape: ShapeRaw,
+    /// Radius of a cylinder, sphere or capsule, above 0.
+    #[schemars(extend("x-quantity" = "length", "x-default" = "by shape"))]
+    pub(super) radius: Option<At<f64>>,
+    /// Half of a cylinder's length, or half of the distance between the centres of a capsule's
+    /// round ends, above 0. A cylinder without it is infinite.
+    #[schemars(extend("x-quantity" = "length", "x-default" = "by shape"))]
+    pub(super) half_length: Option<At<f64>>,
+    /// Half of each edge of a box, along local x, y, z, above 0.
+    #[schemars(extend("x-quantity" = "length", "x-default" = "by shape"))]
+    pub(super) half_extents: Option<At<Vector<3>>>,
+    /// STL or OBJ file of a mesh, closed and with outward triangles, relative to the scene file.
+    #[schemars(extend("x-default" = "by shape"))]
+    pub(super) file: Option<At<String>>,
+    /// Factor from the coordinates of `file` to the scene's length unit, above 0.
+    #[schemars(extend("x-quantity" = "number", "default" = 1.0))]
+    pub(super) scale: Option<At<f64>>,
+    /// Where the tool's origin starts, in the part's frame.
+    #[schemars(extend("x-quantity" = "length"))]
+    pub(super) position: At<Vector<3>>,
+    /// Where the tool's local +z points, in the part's frame; any length but 0. The shortest turn
+    /// from +z leads there.
+    #[schemars(extend("x-quantity" = "number", "default" = [0.0, 0.0, 1.0]))]
+    pub(super) axis: Option<At<Vector<3>>>,
+    /// The tool's rotation as a quaternion x, y, z, w, instead of `axis`; any length but 0.
+    #[schemars(extend("x-quantity" = "number", "x-default" = "by `axis`"))]
+    pub(super) rotation: Option<At<Vector<4>>>,
+}
+
+#[derive(Debug, Default, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct HoldsRaw {
+    /// The body that the hand moves.
+    pub(super) handle: Handle,
+}
+
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct HandRaw {
+    /// Where the held body goes, in the part's frame at the start; any length but 0.
+    #[schemars(extend("x-quantity" = "number"))]
+    pub(super) direction: At<Vector<3>>,
+    /// Speed of the target, above 0.
+    #[schemars(extend("x-quantity" = "speed"))]
+    pub(super) speed: At<f64>,
+    /// Way of the target, above 0.
+    #[schemars(extend("x-quantity" = "length"))]
+    pub(super) travel: At<f64>,
+    /// Rest at full travel.
+    #[schemars(extend("x-quantity" = "time", "default" = 0.0))]
+    pub(super) hold: Option<At<f64>>,
+    /// Whether the hand pulls back to the start afterwards.
+    #[serde(default)]
+    pub(super) retract: bool,
+    /// Mass of handle and hand, above 0.
+    #[schemars(extend("x-quantity" = "mass", "default" = default::HAND_MASS))]
+    pub(super) mass: Option<At<f64>>,
+    /// Stiffness of the grip, above 0. A grip stiffer than the clip's falling branch traces the
+    /// whole force-travel curve; a softer one jumps, which is the snap that a hand feels.
+    #[schemars(extend("x-quantity" = "stiffness", "default" = default::HAND_STIFFNESS))]
+    pub(super) stiffness: Option<At<f64>>,
+    /// Damping of the grip; 2 sqrt(mass stiffness) is critical.
+    #[schemars(extend("x-quantity" = "damping", "default" = default::HAND_DAMPING))]
+    pub(super) damping: Option<At<f64>>,
+    /// Moment of inertia of handle and hand, the same about all axes, above 0.
+    #[schemars(extend(
+        "x-quantity" = "rotational_inertia",
+        "default" = default::HAND_ROTATIONAL_INERTIA
+    ))]
+    pub(super) rotational_inertia: Option<At<f64>>,
+    /// Stiffness of the wrist, above 0.
+    #[schemars(extend(
+        "x-quantity" = "rotational_stiffness",
+        "default" = default::HAND_ROTATIONAL_STIFFNESS
+    ))]
+    pub(super) rotational_stiffness: Option<At<f64>>,
+    /// Damping of the wrist.
+    #[schemars(extend(
+        "x-quantity" = "rotational_damping",
+        "default" = default::HAND_ROTATIONAL_DAMPING
+    ))]
+    pub(super) rotational_damping: Option<At<f64>>,
+}
+
+#[derive(Debug, Default, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct CouplingRaw {
+    /// Stiffness against shifts, above 0.
+    #[schemars(extend(
+        "x-quantity" = "stiffness",
+        "default" = default::COUPLING_TRANSLATIONAL_STIFFNESS
+    ))]
+    pub(super) translational_stiffness: Option<At<f64>>,
+    /// Stiffness against turns, above 0.
+    #[schemars(extend(
+        "x-quantity" = "rotational_stiffness",
+        "default" = default::COUPLING_ROTATIONAL_STIFFNESS
+    ))]
+    pub(super) rotational_stiffness: Option<At<f64>>,
+}
+
+#[derive(Debug, Default, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct DeviceRaw {
+    /// Which device.
+    pub(super) model: DeviceModel,
+    /// Time between two forces sent to the device, 1e-5 s to 0.1 s.
+    #[schemars(extend("x-quantity" = "time", "default" = default::SERVO_PERIOD))]
+    pub(super) servo_period: Option<At<f64>>,
+    /// Whether each step waits for its moment on the clock; else steps follow each other at once.
+    pub(super) real_time: bool,
+}
+
+/// How often contact planes are put on anew.
+#[derive(Debug)]
+pub(super) enum IterationsRaw {
+    Converged,
+    Times(i64),
+}
+
+impl<'de> Deserialize<'de> for IterationsRaw {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Iterations;
+        impl Visitor<'_> for Iterations {
+            type Value = IterationsRaw;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("\"converged\" or a number from 1 to 50")
+            }
+            fn visit_str<E: de::Error>(self, word: &str) -> Result<IterationsRaw, E> {
+                match word {
+                    "converged" => Ok(IterationsRaw::Converged),
+                    _ => Err(E::unknown_variant(word, &["converged"])),
+                }
+            }
+            fn visit_i64<E: de::Error>(self, times: i64) -> Result<IterationsRaw, E> {
+                Ok(IterationsRaw::Times(times))
+            }
+        }
+        deserializer.deserialize_any(Iterations)
+    }
+}
+
+impl JsonSchema for IterationsRaw {
+    fn inline_schema() -> bool {
+        true
+    }
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "ContactIterations".into()
+    }
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "x-type": "`\"converged\"` or integer",
+            "anyOf": [
+                { "const": "converged" },
+                { "type": "integer", "minimum": 1, "maximum": 50 }
+            ]
+        })
+    }
+}
+
+/// Number type of the displacement multiply.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum ScalarRaw {
+    F64,
+    /// not in this version.
+    F32,
+}
+
+/// Where the displacement multiply runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum MultiplyRaw {
+    /// the fastest that is there.
+    Auto,
+    /// the processor.
+    Cpu,
+    /// not in this version.
+    Gpu,
+}
+
+#[derive(Debug, Default, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct AccuracyRaw {
+    /// How often contact planes are put on anew at the new positions within one step: until the
+    /// displacement no longer changes, or 1 to 50 times.
+    #[schemars(extend("default" = "converged"))]
+    pub(super) contact_iterations: Option<At<IterationsRaw>>,
+    /// Nodes nearer to the tool than this get a contact plane, above 0.
+    #[schemars(extend("x-quantity" = "length", "x-default" = "chosen from the tool's motion"))]
+    pub(super) near_distance: Option<At<f64>>,
+    /// Largest residual of the contact solution, scaled by its largest terms, 1e-15 to 1e-2;
+    /// what is beyond it is reported.
+    #[schemars(extend("x-quantity" = "number", "default" = default::LCP_TOLERANCE))]
+    pub(super) lcp_tolerance: Option<At<f64>>,
+    /// Contact planes in one step, 1 to 5000; beyond it the deepest are kept and the rest is
+    /// counted and reported.
+    #[schemars(range(min = 1, max = 5000), extend("default" = default::MAX_CONTACTS))]
+    pub(super) max_contacts: Option<At<i64>>,
+    /// Number type of the displacement multiply; forces are always computed in f64.
+    #[schemars(extend("default" = "f64"))]
+    pub(super) scalar: Option<At<ScalarRaw>>,
+    /// Where the displacement multiply runs.
+    #[schemars(extend("default" = "auto"))]
+    pub(super) multiply: Option<At<MultiplyRaw>>,
+}
+
+/// How an effect is to be treated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum EffectRaw {
+    Off,
+    Auto,
+    On,
+}
+
+#[derive(Debug, Default, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct EffectsRaw {
+    /// Coulomb friction between part and tool.
+    #[schemars(extend("default" = "auto"))]
+    pub(super) friction: Option<At<EffectRaw>>,
+    /// Rotation of the part's arms beyond linear elasticity.
+    #[schemars(extend("default" = "auto"))]
+    pub(super) large_rotation: Option<At<EffectRaw>>,
+    /// Weight of the part.
+    #[schemars(extend("default" = "auto"))]
+    pub(super) gravity: Option<At<EffectRaw>>,
+    /// Mass of the tool.
+    #[schemars(extend("default" = "auto"))]
+    pub(super) tool_inertia: Option<At<EffectRaw>>,
+    /// Mass of the part.
+    #[schemars(extend("default" = "auto"))]
+    pub(super) part_inertia: Option<At<EffectRaw>>,
+    /// Damping of the part.
+    #[schemars(extend("default" = "auto"))]
+    pub(super) damping: Option<At<EffectRaw>>,
+    /// Tool motion within one step.
+    #[schemars(extend("default" = "auto"))]
+    pub(super) continuous_collision: Option<At<EffectRaw>>,
+    /// Elasticity of the tool.
+    #[schemars(extend("default" = "auto"))]
+    pub(super) deformable_tool: Option<At<EffectRaw>>,
+    /// Coulomb's coefficient of part on tool, for the size of friction, at least 0.
+    #[schemars(extend("x-quantity" = "number"))]
+    pub(super) friction_coefficient: Option<At<f64>>,
+}
+
+#[derive(Debug, Default, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct OutputRaw {
+    /// Moments of which pictures and shapes are kept, 0 to 1000.
+    #[schemars(range(min = 0, max = 1000), extend("default" = default::FRAMES))]
+    pub(super) frames: Option<At<i64>>,
+    /// Write a PNG of each frame.
+    #[schemars(extend("default" = true))]
+    pub(super) pictures: Option<bool>,
+    /// Write the deformed shape of each frame as VTU, for ParaView.
+    #[schemars(extend("default" = true))]
+    pub(super) vtu: Option<bool>,
+    /// Write the session as MCAP, for replay and for Foxglove.
+    #[schemars(extend("default" = true))]
+    pub(super) mcap: Option<bool>,
+}
+
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct HandbookRaw {
+    /// Length of the arm from its root to the catch, above 0.
+    #[schemars(extend("x-quantity" = "length"))]
+    pub(super) length: At<f64>,
+    /// Thickness of the arm in the bending direction, above 0.
+    #[schemars(extend("x-quantity" = "length"))]
+    pub(super) thickness: At<f64>,
+    /// Width of the arm, above 0.
+    #[schemars(extend("x-quantity" = "length"))]
+    pub(super) width: At<f64>,
+    /// Undercut: how far the arm must bend to pass, above 0.
+    #[schemars(extend("x-quantity" = "length"))]
+    pub(super) undercut: At<f64>,
+    /// Angle of the lead-in ramp to the direction of insertion, above 0 and below 90.
+    #[schemars(extend("x-quantity" = "angle"))]
+    pub(super) lead_angle_deg: At<f64>,
+    /// Coulomb's coefficient on the ramp, at least 0; 0 compares with this program, which
+    /// simulates none.
+    #[schemars(extend("x-quantity" = "number"))]
+    pub(super) friction: At<f64>,
+}
+
+/// Reads the text; what does not fit the keys above is an error with its line.
+pub(super) fn parse(source: &str, path: &Path) -> Result<SceneRaw, SceneError> {
+    toml::from_str(source).map_err(|error| translate(&error, source, path))
+}
+
+/// The TOML reader's error in our words. Its messages are serde's, which name the wrong word and
+/// the right ones in backticks.
+fn translate(error: &toml::de::Error, source: &str, path: &Path) -> SceneError {
+    let offset = error.span().map_or(0, |span| span.start);
+    let line = line_of(source, offset);
+    let path = path.to_path_buf();
+    let message = error.message();
+    // The name is the file's and may hold backticks itself; the known ones behind it do not.
+    let (head, tail) = message.rsplit_once(", expected ").unwrap_or((message, ""));
+    let first = head.split_once('`').map_or("", |(_, name)| name);
+    let first = plain(first.strip_suffix('`').unwrap_or(first));
+    let known: Vec<&str> = tail.split('`').skip(1).step_by(2).collect();
+    if message.starts_with("unknown field") {
+        let mend = suggestion(&first, &known);
+        SceneError::UnknownKey {
+            path,
+            line,
+            key: first,
+            mend,
+        }
+    } else if message.starts_with("unknown variant") {
+        let (key, mend) = (key_before(source, offset), suggestion(&first, &known));
+        SceneError::UnknownWord {
+            path,
+            line,
+            key,
+            word: first,
+            mend,
+        }
+    } else if message.starts_with("missing field") {
+        let (what, mend) = if super::schema::REQUIRED_SECTIONS.contains(&first.as_str()) {
+            (
+                format!("section [{first}] is missing"),
+                "docs/scene.md has an example".to_owned(),
+            )
+        } else {
+            let section = section_at(source, offset);
+            (
+                format!("key `{first}` is missing{section}"),
+                format!("add `{first} = ...`"),
+            )
+        };
+        SceneError::Missing {
+            path,
+            line,
+            what,
+            mend,
+        }
+    } else if message.starts_with("invalid type") || message.starts_with("invalid length") {
+        SceneError::Type {
+            path,
+            line,
+            key: key_before(source, offset),
+            what: in_words(&one_line(message)),
+        }
+    } else if message == "wanted string or table" {
+        // What the reader says of a choice that is not a word.
+        SceneError::Type {
+            path,
+            line,
+            key: key_before(source, offset),
+            what: "not a word; write one in quotes".to_owned(),
+        }
+    } else {
+        SceneError::Syntax {
+            path,
+            line,
+            what: one_line(message),
+        }
+    }
+}
+
+/// Serde's names of types in those of the document.
+fn in_words(message: &str) -> String {
+    let (found, expected) = message.rsplit_once(", expected ").unwrap_or((message, ""));
+    let expected = match expected {
+        "" => return message.to_owned(),
+        "f64" => "a number",
+        "i64" => "a whole number that fits 64 bits",
+        section if section.starts_with("struct ") => "a section",
+        other => other,
+    };
+    let found = found.strip_suffix(" as i128").unwrap_or(found);
+    let found = match found {
+        "invalid type: map" => "invalid type: table",
+        other => other,
+    };
+    format!("{found}, expected {expected}")
+}
+
+fn one_line(message: &str) -> String {
+    let lines: Vec<&str> = message
+        .lines()
+        .map(str::trim)
+        .filter(|line| !line.is_empty())
+        .collect();
+    plain(&lines.join("; "))
+}
+
+/// Name of the key whose value stands at an offset, for messages: the last `name =` before it.
+fn key_before(source: &str, offset: usize) -> String {
+    let before = source.get(..offset).unwrap_or_default();
+    let key = before
+        .rfind('=')
+        .map_or("", |equals| before[..equals].trim_end());
+    let start = key.rfind(|c: char| !(c.is_alphanumeric() || "_-.".contains(c)));
+    let start = start.map_or(0, |at| {
+        at + key[at..].chars().next().map_or(0, char::len_utf8)
+    });
+    match &key[start..] {
+        "" => "value".to_owned(),
+        name => name.to_owned(),
+    }
+}
+
+/// ` in [section]` if the offset is at or below a section's header.
+fn section_at(source: &str, offset: usize) -> String {
+    let end = source
+        .get(offset..)
+        .and_then(|rest| rest.find('\n'))
+        .map_or(source.len(), |length| offset + length);
+    let before = source.get(..end).unwrap_or_default();
+    let header = before
+        .lines()
+        .rev()
+        .map(str::trim)
+        .find(|line| line.starts_with('['));
+    match header.and_then(|line| line.split(']').next()) {
+        Some(header) => format!(" in {header}]"),
+        None => String::new(),
+    }
+}

@@ -1,0 +1,686 @@
+//! From keys as written to a scene that makes sense, in SI.
+
+use std::path::{Path, PathBuf};
+
+use glam::{DQuat, DVec3};
+use glamx::DPose3;
+
+use super::error::{SceneError, line_of, plain};
+use super::raw::{
+    self, At, EffectRaw, IterationsRaw, MultiplyRaw, ScalarRaw, ShapeRaw, Vector, default,
+};
+use super::units::{Quantity, to_si};
+use super::{
+    Accuracy, ContactIterations, Coupling, Device, EffectChoice, Effects, Fixed, GroupName, Hand,
+    Handbook, Material, Multiply, Output, Part, Scalar, Scene, Tool, ToolShape, Units,
+};
+
+/// Servo periods in one run: 10 000 s at 1 kHz. More is a slip of the units, and would fill disks.
+const MOST_STEPS: f64 = 1e7;
+
+/// Checks everything and converts it to SI.
+pub(super) fn scene(raw: raw::SceneRaw, source: String, path: &Path) -> Result<Scene, SceneError> {
+    let (check, units) = (
+        Check {
+            source: &source,
+            path,
+            units: raw.units,
+        },
+        raw.units,
+    );
+    let device = check.device(&raw.device)?;
+    let scene = Scene {
+        title: raw.title.unwrap_or_else(|| {
+            path.file_stem()
+                .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned())
+        }),
+        units,
+        length_scale: to_si(units, Quantity::Length),
+        part: check.part(raw.part)?,
+        tool: check.tool(&raw.tool)?,
+        handle: raw.holds.handle,
+        hand: check.hand(&raw.hand, &device)?,
+        coupling: check.coupling(&raw.coupling)?,
+        device,
+        accuracy: check.accuracy(&raw.accuracy)?,
+        effects: check.effects(&raw.effects)?,
+        output: check.output(&raw.output)?,
+        handbook: raw
+            .handbook
+            .map(|handbook| check.handbook(&handbook))
+            .transpose()?,
+        path: path.to_path_buf(),
+        source: String::new(),
+    };
+    Ok(Scene { source, ..scene })
+}
+
+/// What every check needs: the text for lines, the path for messages, the units.
+struct Check<'a> {
+    source: &'a str,
+    path: &'a Path,
+    units: Units,
+}
+
+/// Which values a number may have, in the file's units, with the words for it.
+#[derive(Clone, Copy)]
+enum Range {
+    Positive,
+    NotNegative,
+    Any,
+}
+
+impl Check<'_> {
+    fn error(&self, offset: usize, what: String, mend: impl Into<String>) -> SceneError {
+        SceneError::Value {
+            path: self.path.to_path_buf(),
+            line: line_of(self.source, offset),
+            what: plain(&what),
+            mend: mend.into(),
+        }
+    }
+
+    /// A finite number in range, in SI.
+    fn number(
+        &self,
+        key: &str,
+        at: &At<f64>,
+        quantity: Quantity,
+        range: Range,
+    ) -> Result<f64, SceneError> {
+        let written = at.value;
+        let value = written * to_si(self.units, quantity);
+        if !written.is_finite() {
+            return Err(self.error(at.offset, format!("{key} is {written}"), "write a number"));
+        }
+        if !value.is_finite() || (value == 0.0 && written != 0.0) {
+            let what = format!("{key} {written:e} is beyond what SI numbers can hold");
+            return Err(self.error(at.offset, what, "check the units"));
+        }
+        match range {
+            Range::Positive if value <= 0.0 => {
+                let what = format!("{key} {written} must be above 0");
+                Err(self.error(at.offset, what, "write a positive number"))
+            }
+            Range::NotNegative if value < 0.0 => {
+                let what = format!("{key} {written} must not be negative");
+                Err(self.error(at.offset, what, "write 0 or more"))
+            }
+            _ => Ok(value),
+        }
+    }
+
+    /// As `number`, or the default, which is in SI.
+    fn number_or(
+        &self,
+        key: &str,
+        at: Option<&At<f64>>,
+        default: f64,
+        quantity: Quantity,
+        range: Range,
+    ) -> Result<f64, SceneError> {
+        at.map_or(Ok(default), |at| self.number(key, at, quantity, range))
+    }
+
+    fn vector<const N: usize>(
+        &self,
+        key: &str,
+        at: &At<Vector<N>>,
+        quantity: Quantity,
+        range: Range,
+    ) -> Result<[f64; N], SceneError> {
+        let mut values = at.value.0;
+        for (value, name) in values.iter_mut().zip(["x", "y", "z", "w"]) {
+            let component = At {
+                value: *value,
+                offset: at.offset,
+            };
+            *value = self.number(&format!("{key} {name}"), &component, quantity, range)?;
+        }
+        Ok(values)
+    }
+
+    /// Unit vector of a direction.
+    fn direction(&self, key: &str, at: &At<Vector<3>>) -> Result<DVec3, SceneError> {
+        let written = self.vector(key, at, Quantity::Number, Range::Any)?;
+        // First by the largest component, so that the square neither overflows nor vanishes.
+        let vector = DVec3::from_array(written);
+        (vector / vector.abs().max_element())
+            .try_normalize()
+            .ok_or_else(|| {
+                let what = format!("{key} {written:?} has no direction");
+                self.error(
+                    at.offset,
+                    what,
+                    "write where it points, such as [0.0, -1.0, 0.0]",
+                )
+            })
+    }
+
+    /// A whole number from `least` to `most`.
+    fn integer(&self, key: &str, at: &At<i64>, least: i64, most: i64) -> Result<i64, SceneError> {
+        if (least..=most).contains(&at.value) {
+            return Ok(at.value);
+        }
+        let what = format!("{key} {} is out of range", at.value);
+        Err(self.error(at.offset, what, format!("write {least} to {most}")))
+    }
+
+    /// A file that is there; `name` is relative to the scene's folder.
+    fn file(&self, key: &str, at: &At<String>, mend: &str) -> Result<PathBuf, SceneError> {
+        let folder = self.path.parent().unwrap_or(Path::new(""));
+        let path = folder.join(&at.value);
+        if path.is_file() {
+            return Ok(path);
+        }
+        let found = if path.is_dir() {
+            "is a folder"
+        } else {
+            "does not exist"
+        };
+        Err(self.error(
+            at.offset,
+            format!("{key} file {} {found}", path.display()),
+            mend,
+        ))
+    }
+
+    /// Group names; one that stands alone has the place of the whole value.
+    fn group(&self, key: &str, name: String, offset: usize) -> Result<GroupName, SceneError> {
+        if name.is_empty() {
+            let what = format!("{key} has an empty group name");
+            return Err(self.error(offset, what, "name a physical group of the mesh"));
+        }
+        Ok(GroupName {
+            name,
+            line: line_of(self.source, offset),
+        })
+    }
+
+    fn part(&self, raw: raw::PartRaw) -> Result<Part, SceneError> {
+        let mend = "paths are relative to the scene file; scenes/README.md shows how to make one";
+        let order = match &raw.order {
+            Some(at) => Some(self.integer("order", at, 1, 3)? as u8),
+            None => None,
+        };
+        let none = |key: &str, offset| {
+            self.error(
+                offset,
+                format!("{key} names no group"),
+                "name a physical group of the mesh",
+            )
+        };
+        if raw.fixed.value.0.is_empty() {
+            return Err(none("fixed", raw.fixed.offset));
+        }
+        if raw.contact.value.0.is_empty() {
+            return Err(none("contact", raw.contact.offset));
+        }
+        let material = self.material(&raw.material)?;
+        let mut fixed = Vec::with_capacity(raw.fixed.value.0.len());
+        for entry in raw.fixed.value.0 {
+            let offset = entry.offset.max(raw.fixed.offset);
+            let components = match &entry.value.components {
+                None => [true; 3],
+                Some(list) => {
+                    let mut components = [false; 3];
+                    for component in &list.value {
+                        components[component.value as usize] = true;
+                    }
+                    if components == [false; 3] {
+                        let what = format!("components of `{}` are empty", entry.value.group);
+                        let mend = "name some of \"x\", \"y\", \"z\", or leave the key out for all";
+                        return Err(self.error(list.offset, what, mend));
+                    }
+                    components
+                }
+            };
+            fixed.push(Fixed {
+                group: self.group("fixed", entry.value.group, offset)?,
+                components,
+            });
+        }
+        let mut contact = Vec::with_capacity(raw.contact.value.0.len());
+        for name in raw.contact.value.0 {
+            let offset = name.offset.max(raw.contact.offset);
+            contact.push(self.group("contact", name.value, offset)?);
+        }
+        Ok(Part {
+            mesh: self.file("mesh", &raw.mesh, mend)?,
+            mesh_line: line_of(self.source, raw.mesh.offset),
+            order,
+            material,
+            fixed,
+            contact,
+            quadrature: raw.quadrature,
+        })
+    }
+
+    fn material(&self, raw: &raw::MaterialRaw) -> Result<Material, SceneError> {
+        use Range::{Any, Positive};
+        let nu = &raw.poisson_ratio;
+        let poisson_ratio = self.number("poisson_ratio", nu, Quantity::Number, Any)?;
+        if poisson_ratio >= 0.5 {
+            let what = format!("poisson_ratio {poisson_ratio} must be below 0.5");
+            return Err(self.error(
+                nu.offset,
+                what,
+                "for rubber-like parts use 0.499 with order = 2",
+            ));
+        }
+        if poisson_ratio <= -1.0 {
+            let what = format!("poisson_ratio {poisson_ratio} must be above -1");
+            return Err(self.error(nu.offset, what, "plastics have 0.3 to 0.45"));
+        }
+        let young = &raw.young_modulus;
+        let young_modulus = self.number("young_modulus", young, Quantity::Pressure, Positive)?;
+        let optional = |key, at: &Option<At<f64>>, quantity| {
+            at.as_ref()
+                .map(|at| self.number(key, at, quantity, Positive))
+                .transpose()
+        };
+        Ok(Material {
+            name: raw.name.clone(),
+            young_modulus,
+            poisson_ratio,
+            density: optional("density", &raw.density, Quantity::Density)?,
+            permissible_strain: optional(
+                "permissible_strain",
+                &raw.permissible_strain,
+                Quantity::Number,
+            )?,
+        })
+    }
+
+    fn tool(&self, at: &At<raw::ToolRaw>) -> Result<Tool, SceneError> {
+        let raw = &at.value;
+        let (shape, keys): (&str, &[&str]) = match raw.shape {
+            ShapeRaw::Cylinder => ("cylinder", &["radius", "half_length"]),
+            ShapeRaw::Sphere => ("sphere", &["radius"]),
+            ShapeRaw::Box => ("box", &["half_extents"]),
+            ShapeRaw::Capsule => ("capsule", &["radius", "half_length"]),
+            ShapeRaw::HalfSpace => ("half-space", &[]),
+            ShapeRaw::Mesh => ("mesh", &["file", "scale"]),
+        };
+        let written = [
+            ("radius", raw.radius.as_ref().map(|at| at.offset)),
+            ("half_length", raw.half_length.as_ref().map(|at| at.offset)),
+            (
+                "half_extents",
+                raw.half_extents.as_ref().map(|at| at.offset),
+            ),
+            ("file", raw.file.as_ref().map(|at| at.offset)),
+            ("scale", raw.scale.as_ref().map(|at| at.offset)),
+        ];
+        for (key, offset) in written {
+            if let Some(offset) = offset.filter(|_| !keys.contains(&key)) {
+                let has = match keys {
+                    [] => "none".to_owned(),
+                    keys => keys.join(" and "),
+                };
+                let what = format!("{key} does not belong to shape \"{shape}\"");
+                return Err(self.error(offset, what, format!("remove it; its own keys: {has}")));
+            }
+        }
+        let missing = |key: &str| SceneError::Missing {
+            path: self.path.to_path_buf(),
+            line: line_of(self.source, at.offset),
+            what: format!("shape \"{shape}\" needs {key} in [tool]"),
+            mend: format!("add `{key} = ...`"),
+        };
+        let length = |key: &str, at: &Option<At<f64>>| {
+            let at = at.as_ref().ok_or_else(|| missing(key))?;
+            self.number(key, at, Quantity::Length, Range::Positive)
+        };
+        let shape = match raw.shape {
+            ShapeRaw::Sphere => ToolShape::Sphere {
+                radius: length("radius", &raw.radius)?,
+            },
+            ShapeRaw::Cylinder => ToolShape::Cylinder {
+                radius: length("radius", &raw.radius)?,
+                half_length: match &raw.half_length {
+                    None => None,
+                    some => Some(length("half_length", some)?),
+                },
+            },
+            ShapeRaw::Capsule => ToolShape::Capsule {
+                radius: length("radius", &raw.radius)?,
+                half_length: length("half_length", &raw.half_length)?,
+            },
+            ShapeRaw::Box => {
+                let at = raw
+                    .half_extents
+                    .as_ref()
+                    .ok_or_else(|| missing("half_extents"))?;
+                let half = self.vector("half_extents", at, Quantity::Length, Range::Positive)?;
+                ToolShape::Box {
+                    half_extents: DVec3::from_array(half),
+                }
+            }
+            ShapeRaw::HalfSpace => ToolShape::HalfSpace,
+            ShapeRaw::Mesh => self.tool_mesh(raw, missing("file"))?,
+        };
+        let position = self.vector("position", &raw.position, Quantity::Length, Range::Any)?;
+        let pose_part_tool = DPose3::from_parts(DVec3::from_array(position), self.rotation(raw)?);
+        Ok(Tool {
+            shape,
+            pose_part_tool,
+        })
+    }
+
+    fn tool_mesh(&self, raw: &raw::ToolRaw, missing: SceneError) -> Result<ToolShape, SceneError> {
+        let at = raw.file.as_ref().ok_or(missing)?;
+        let extension = Path::new(&at.value).extension().unwrap_or_default();
+        if !["stl", "obj"]
+            .iter()
+            .any(|known| extension.eq_ignore_ascii_case(known))
+        {
+            let what = format!("tool file {} is neither .stl nor .obj", at.value);
+            return Err(self.error(at.offset, what, "export the tool as STL or OBJ"));
+        }
+        let file = self.file("tool", at, "paths are relative to the scene file")?;
+        let scale = raw.scale.as_ref();
+        let one = At {
+            value: 1.0,
+            offset: at.offset,
+        };
+        let scale = self.number(
+            "scale",
+            scale.unwrap_or(&one),
+            Quantity::Length,
+            Range::Positive,
+        )?;
+        Ok(ToolShape::Mesh {
+            file,
+            line: line_of(self.source, at.offset),
+            scale,
+        })
+    }
+
+    fn rotation(&self, raw: &raw::ToolRaw) -> Result<DQuat, SceneError> {
+        match (&raw.axis, &raw.rotation) {
+            (Some(_), Some(rotation)) => Err(self.error(
+                rotation.offset,
+                "axis and rotation are both given".to_owned(),
+                "keep one of them",
+            )),
+            (Some(axis), None) => Ok(DQuat::from_rotation_arc(
+                DVec3::Z,
+                self.direction("axis", axis)?,
+            )),
+            (None, Some(at)) => {
+                let [x, y, z, w] = self.vector("rotation", at, Quantity::Number, Range::Any)?;
+                let largest = x.abs().max(y.abs()).max(z.abs()).max(w.abs());
+                if largest == 0.0 {
+                    let what = "rotation [0, 0, 0, 0] turns nowhere".to_owned();
+                    let mend = "write x, y, z, w; [0.0, 0.0, 0.0, 1.0] is no turn";
+                    return Err(self.error(at.offset, what, mend));
+                }
+                Ok(
+                    DQuat::from_xyzw(x / largest, y / largest, z / largest, w / largest)
+                        .normalize(),
+                )
+            }
+            (None, None) => Ok(DQuat::IDENTITY),
+        }
+    }
+
+    fn hand(&self, at: &At<raw::HandRaw>, device: &Device) -> Result<Hand, SceneError> {
+        use Range::{NotNegative, Positive};
+        let raw = &at.value;
+        let or = |key, at: &Option<At<f64>>, default, quantity, range| {
+            self.number_or(key, at.as_ref(), default, quantity, range)
+        };
+        let hand = Hand {
+            direction: self.direction("direction", &raw.direction)?,
+            speed: self.number("speed", &raw.speed, Quantity::Speed, Positive)?,
+            travel: self.number("travel", &raw.travel, Quantity::Length, Positive)?,
+            hold: or("hold", &raw.hold, 0.0, Quantity::Time, NotNegative)?,
+            retract: raw.retract,
+            mass: or(
+                "mass",
+                &raw.mass,
+                default::HAND_MASS,
+                Quantity::Mass,
+                Positive,
+            )?,
+            stiffness: or(
+                "stiffness",
+                &raw.stiffness,
+                default::HAND_STIFFNESS,
+                Quantity::Stiffness,
+                Positive,
+            )?,
+            damping: or(
+                "damping",
+                &raw.damping,
+                default::HAND_DAMPING,
+                Quantity::Damping,
+                NotNegative,
+            )?,
+            rotational_inertia: or(
+                "rotational_inertia",
+                &raw.rotational_inertia,
+                default::HAND_ROTATIONAL_INERTIA,
+                Quantity::RotationalInertia,
+                Positive,
+            )?,
+            rotational_stiffness: or(
+                "rotational_stiffness",
+                &raw.rotational_stiffness,
+                default::HAND_ROTATIONAL_STIFFNESS,
+                Quantity::RotationalStiffness,
+                Positive,
+            )?,
+            rotational_damping: or(
+                "rotational_damping",
+                &raw.rotational_damping,
+                default::HAND_ROTATIONAL_DAMPING,
+                Quantity::RotationalDamping,
+                NotNegative,
+            )?,
+        };
+        let steps = hand.duration() / device.servo_period;
+        if steps > MOST_STEPS {
+            let what = format!(
+                "travel, speed and hold make {steps:.1e} steps of {} s, more than {MOST_STEPS:e}",
+                device.servo_period
+            );
+            return Err(self.error(raw.speed.offset, what, "move faster or hold for less"));
+        }
+        Ok(hand)
+    }
+
+    fn coupling(&self, raw: &raw::CouplingRaw) -> Result<Coupling, SceneError> {
+        Ok(Coupling {
+            translational_stiffness: self.number_or(
+                "translational_stiffness",
+                raw.translational_stiffness.as_ref(),
+                default::COUPLING_TRANSLATIONAL_STIFFNESS,
+                Quantity::Stiffness,
+                Range::Positive,
+            )?,
+            rotational_stiffness: self.number_or(
+                "rotational_stiffness",
+                raw.rotational_stiffness.as_ref(),
+                default::COUPLING_ROTATIONAL_STIFFNESS,
+                Quantity::RotationalStiffness,
+                Range::Positive,
+            )?,
+        })
+    }
+
+    fn device(&self, raw: &raw::DeviceRaw) -> Result<Device, SceneError> {
+        let servo_period = match &raw.servo_period {
+            None => default::SERVO_PERIOD,
+            Some(at) => {
+                let period = self.number("servo_period", at, Quantity::Time, Range::Positive)?;
+                if !(1e-5..=0.1).contains(&period) {
+                    let what = format!("servo_period {period} s is not between 1e-5 and 0.1");
+                    return Err(self.error(at.offset, what, "haptic devices take 0.001"));
+                }
+                period
+            }
+        };
+        Ok(Device {
+            model: raw.model,
+            servo_period,
+            real_time: raw.real_time,
+        })
+    }
+
+    fn accuracy(&self, raw: &raw::AccuracyRaw) -> Result<Accuracy, SceneError> {
+        if let Some(at) = raw.scalar.as_ref().filter(|at| at.value == ScalarRaw::F32) {
+            let what = "scalar \"f32\" is not in this version".to_owned();
+            return Err(self.error(at.offset, what, "use \"f64\" or leave the key out"));
+        }
+        if let Some(at) = raw
+            .multiply
+            .as_ref()
+            .filter(|at| at.value == MultiplyRaw::Gpu)
+        {
+            let what = "multiply \"gpu\" is not in this version".to_owned();
+            return Err(self.error(at.offset, what, "use \"auto\" or \"cpu\""));
+        }
+        let contact_iterations = match &raw.contact_iterations {
+            None
+            | Some(At {
+                value: IterationsRaw::Converged,
+                ..
+            }) => ContactIterations::Converged,
+            Some(At {
+                value: IterationsRaw::Times(times),
+                offset,
+            }) => {
+                let at = At {
+                    value: *times,
+                    offset: *offset,
+                };
+                ContactIterations::Times(self.integer("contact_iterations", &at, 1, 50)? as u32)
+            }
+        };
+        let near = raw.near_distance.as_ref();
+        let near_distance = near
+            .map(|at| self.number("near_distance", at, Quantity::Length, Range::Positive))
+            .transpose()?;
+        let lcp_tolerance = match &raw.lcp_tolerance {
+            None => default::LCP_TOLERANCE,
+            Some(at) => {
+                let value = self.number("lcp_tolerance", at, Quantity::Number, Range::Positive)?;
+                if !(1e-15..=1e-2).contains(&value) {
+                    let what = format!("lcp_tolerance {value:e} is not between 1e-15 and 1e-2");
+                    return Err(self.error(at.offset, what, "1e-10 is safe with 64-bit numbers"));
+                }
+                value
+            }
+        };
+        let most = raw.max_contacts.as_ref();
+        let max_contacts = most.map_or(Ok(default::MAX_CONTACTS), |at| {
+            self.integer("max_contacts", at, 1, 5000)
+        })?;
+        Ok(Accuracy {
+            contact_iterations,
+            near_distance,
+            lcp_tolerance,
+            max_contacts: max_contacts as usize,
+            scalar: Scalar::F64,
+            multiply: match raw.multiply.as_ref().map(|at| at.value) {
+                Some(MultiplyRaw::Cpu) => Multiply::Cpu,
+                _ => Multiply::Auto,
+            },
+        })
+    }
+
+    fn effects(&self, raw: &raw::EffectsRaw) -> Result<Effects, SceneError> {
+        let choice = |key: &str, at: &Option<At<EffectRaw>>| match at {
+            None
+            | Some(At {
+                value: EffectRaw::Auto,
+                ..
+            }) => Ok(EffectChoice::Auto),
+            Some(At {
+                value: EffectRaw::Off,
+                ..
+            }) => Ok(EffectChoice::Off),
+            Some(At {
+                value: EffectRaw::On,
+                offset,
+            }) => Err(self.error(
+                *offset,
+                format!("this version does not simulate {key}"),
+                "use \"auto\" to be told its size",
+            )),
+        };
+        let coefficient = raw.friction_coefficient.as_ref();
+        Ok(Effects {
+            friction: choice("friction", &raw.friction)?,
+            large_rotation: choice("large_rotation", &raw.large_rotation)?,
+            gravity: choice("gravity", &raw.gravity)?,
+            tool_inertia: choice("tool_inertia", &raw.tool_inertia)?,
+            part_inertia: choice("part_inertia", &raw.part_inertia)?,
+            damping: choice("damping", &raw.damping)?,
+            continuous_collision: choice("continuous_collision", &raw.continuous_collision)?,
+            deformable_tool: choice("deformable_tool", &raw.deformable_tool)?,
+            friction_coefficient: coefficient
+                .map(|at| {
+                    self.number(
+                        "friction_coefficient",
+                        at,
+                        Quantity::Number,
+                        Range::NotNegative,
+                    )
+                })
+                .transpose()?,
+        })
+    }
+
+    fn output(&self, raw: &raw::OutputRaw) -> Result<Output, SceneError> {
+        let frames = raw.frames.as_ref().map_or(Ok(default::FRAMES), |at| {
+            self.integer("frames", at, 0, 1000)
+        })?;
+        Ok(Output {
+            frames: frames as u32,
+            pictures: raw.pictures.unwrap_or(true),
+            vtu: raw.vtu.unwrap_or(true),
+            mcap: raw.mcap.unwrap_or(true),
+        })
+    }
+
+    fn handbook(&self, raw: &raw::HandbookRaw) -> Result<Handbook, SceneError> {
+        let length = |key, at| self.number(key, at, Quantity::Length, Range::Positive);
+        let angle = &raw.lead_angle_deg;
+        let friction = &raw.friction;
+        let handbook = Handbook {
+            length: length("length", &raw.length)?,
+            thickness: length("thickness", &raw.thickness)?,
+            width: length("width", &raw.width)?,
+            undercut: length("undercut", &raw.undercut)?,
+            lead_angle_deg: self.number(
+                "lead_angle_deg",
+                angle,
+                Quantity::Angle,
+                Range::Positive,
+            )?,
+            friction: self.number("friction", friction, Quantity::Number, Range::NotNegative)?,
+        };
+        if handbook.lead_angle_deg >= 90.0 {
+            let what = format!(
+                "lead_angle_deg {} must be below 90",
+                handbook.lead_angle_deg
+            );
+            return Err(self.error(angle.offset, what, "ramps have 20 to 45"));
+        }
+        if handbook.is_locked() {
+            let what = format!(
+                "friction {} locks a ramp of {} degrees",
+                handbook.friction, handbook.lead_angle_deg
+            );
+            return Err(self.error(
+                friction.offset,
+                what,
+                "friction times tan(lead angle) must be below 1",
+            ));
+        }
+        Ok(handbook)
+    }
+}

@@ -1,0 +1,189 @@
+//! A scene in the terms of the crates: the one place that maps keys of the file to settings of
+//! `fem`, `contact`, `device` and the engine.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use contact::lcp;
+use contact::tool::{BoxShape, Capsule, Cylinder, HalfSpace, Mesh as ToolMesh, Sphere, Tool};
+use device::{HandSettings, VirtualCoupling};
+use fem::{Material, Quadrature};
+
+use crate::Error;
+use crate::engine::{ContactIterations, Engine, EngineSettings};
+use crate::prepare::{GroupRef, PartSpec, PreparedPart};
+use crate::scene::{self, QuadratureRule, Scene, ToolShape};
+use crate::session::{Holds, SessionSpec, part_extent};
+
+/// The part of a scene.
+///
+/// # Errors
+/// A material that `fem` refuses (the scene's own checks are the same).
+pub fn part_spec(scene: &Scene) -> Result<PartSpec, Error> {
+    let place = |line: usize| format!("{}:{line}", scene.path.display());
+    let group = |g: &scene::GroupName| GroupRef {
+        name: g.name.clone(),
+        place: place(g.line),
+    };
+    let material = &scene.part.material;
+    Ok(PartSpec {
+        mesh_path: scene.part.mesh.clone(),
+        length_scale: scene.length_scale,
+        order: scene.part.order,
+        material: Material::new(material.young_modulus, material.poisson_ratio)
+            .map_err(|e| Error::part(&scene.path, e))?,
+        fixed: scene
+            .part
+            .fixed
+            .iter()
+            .map(|f| (group(&f.group), f.components))
+            .collect(),
+        contact: scene.part.contact.iter().map(group).collect(),
+        quadrature: match scene.part.quadrature {
+            QuadratureRule::Fast => Quadrature::Fast,
+            QuadratureRule::Converged => Quadrature::Converged,
+        },
+    })
+}
+
+/// The tool of a scene, with remarks on what was mended in its mesh.
+///
+/// # Errors
+/// A tool mesh that cannot be read or is not a closed surface.
+pub fn tool(scene: &Scene) -> Result<(Tool, Vec<String>), Error> {
+    let in_scene = |source| Error::Tool {
+        path: scene.path.clone(),
+        source,
+    };
+    let tool = match &scene.tool.shape {
+        ToolShape::Sphere { radius } => Sphere::new(*radius).map(Tool::Sphere).map_err(in_scene)?,
+        ToolShape::Cylinder {
+            radius,
+            half_length,
+        } => Cylinder::new(*radius, *half_length)
+            .map(Tool::Cylinder)
+            .map_err(in_scene)?,
+        ToolShape::Box { half_extents } => BoxShape::new(*half_extents)
+            .map(Tool::Box)
+            .map_err(in_scene)?,
+        ToolShape::Capsule {
+            radius,
+            half_length,
+        } => Capsule::new(*radius, *half_length)
+            .map(Tool::Capsule)
+            .map_err(in_scene)?,
+        ToolShape::HalfSpace => Tool::HalfSpace(HalfSpace),
+        ToolShape::Mesh { file, line, scale } => return tool_mesh(scene, file, *line, *scale),
+    };
+    Ok((tool, Vec::new()))
+}
+
+fn tool_mesh(
+    scene: &Scene,
+    file: &Path,
+    line: usize,
+    scale: f64,
+) -> Result<(Tool, Vec<String>), Error> {
+    let mesh = ToolMesh::read(file, scale).map_err(|e| {
+        Error::Input(format!(
+            "{}:{line}: tool.file {}: {e}",
+            scene.path.display(),
+            file.display()
+        ))
+    })?;
+    let repair = mesh.repair();
+    let counts = [
+        (repair.n_merged_vertices, "equal corner points were merged"),
+        (
+            repair.n_removed_triangles,
+            "triangles without area were removed",
+        ),
+        (
+            repair.n_turned_triangles,
+            "triangles were turned to face the same way",
+        ),
+        (
+            repair.n_inverted_pieces,
+            "pieces were turned inside out to face outwards",
+        ),
+    ];
+    let remarks = counts
+        .into_iter()
+        .filter(|(n, what)| *n > 0 && !what.contains("merged"))
+        .map(|(n, what)| format!("{}: {n} {what}", file.display()))
+        .collect();
+    Ok((Tool::Mesh(Arc::new(mesh)), remarks))
+}
+
+/// The engine of a scene.
+///
+/// # Errors
+/// Settings that the crates refuse.
+pub fn engine(scene: &Scene, prepared: &PreparedPart, tool: Tool) -> Result<Engine, Error> {
+    let size = part_extent(&prepared.loaded.mesh).min(tool.characteristic_size());
+    let settings = EngineSettings {
+        contact_iterations: match scene.accuracy.contact_iterations {
+            scene::ContactIterations::Converged => ContactIterations::Converged,
+            scene::ContactIterations::Times(n) => ContactIterations::Fixed(n),
+        },
+        displacement_tolerance: DISPLACEMENT_TOLERANCE,
+        near_distance: scene.accuracy.near_distance.unwrap_or(NEAR_SHARE * size),
+        max_contacts: scene.accuracy.max_contacts,
+        lcp: lcp::Settings {
+            tolerance: scene.accuracy.lcp_tolerance,
+            ..lcp::Settings::default()
+        },
+        max_stride: STRIDE_SHARE * size,
+    };
+    let coupling = VirtualCoupling::new(
+        scene.coupling.translational_stiffness,
+        scene.coupling.rotational_stiffness,
+    )?;
+    Engine::new(
+        Arc::new(prepared.contact_part()),
+        tool,
+        Some(coupling),
+        settings,
+    )
+    .map_err(|source| Error::Tool {
+        path: scene.path.clone(),
+        source,
+    })
+}
+
+/// m. A nanometre on a part of 10 kN/m is a hundred-thousandth of a newton.
+const DISPLACEMENT_TOLERANCE: f64 = 1e-9;
+
+/// Share of the tool's size within which a node gets a plane: 0.2 mm on a tube of 20 mm, some
+/// hundred times what it moves in a millisecond.
+const NEAR_SHARE: f64 = 0.02;
+
+/// Share of the tool's size that the tool moves in one go.
+const STRIDE_SHARE: f64 = 0.02;
+
+/// The scripted session of a scene.
+pub fn session(scene: &Scene) -> SessionSpec {
+    let hand = &scene.hand;
+    SessionSpec {
+        holds: match scene.handle {
+            scene::Handle::Tool => Holds::Tool,
+            scene::Handle::Part => Holds::Part,
+        },
+        tool_pose: scene.tool.pose_part_tool,
+        direction: hand.direction,
+        speed: hand.speed,
+        travel: hand.travel,
+        hold_s: hand.hold,
+        retract: hand.retract,
+        hand: HandSettings {
+            apparent_mass: hand.mass,
+            grip_stiffness: hand.stiffness,
+            grip_damping: hand.damping,
+            apparent_inertia: hand.rotational_inertia,
+            grip_rotational_stiffness: hand.rotational_stiffness,
+            grip_rotational_damping: hand.rotational_damping,
+        },
+        period_s: scene.device.servo_period,
+        real_time: scene.device.real_time,
+    }
+}

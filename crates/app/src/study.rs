@@ -1,0 +1,3 @@
+//! Tables of what the program is worth: comparison with other programs' results.
+
+pub mod verify;

@@ -1,0 +1,204 @@
+//! Computed beside expected: relative error of a value of any shape.
+
+use serde_json::{Value, json};
+
+/// One compared quantity.
+#[derive(Clone, Debug)]
+pub struct Quantity {
+    /// As in `expected.json`.
+    pub name: String,
+    /// Whole, in the shape of the expected value.
+    pub computed: Value,
+    /// As in `expected.json`.
+    pub expected: Value,
+    /// Largest difference over the largest expected entry; for an object the worst of its keys.
+    pub error_rel: f64,
+    /// As in `expected.json`: `rel` and `abs`.
+    pub tolerance: Value,
+    within: bool,
+}
+
+impl Quantity {
+    /// Compares by the tolerance: within if the difference is below `abs`, or below `rel` times
+    /// the largest expected entry (of each key, for an object).
+    pub(super) fn compare(
+        name: &str,
+        computed: Value,
+        expected: &Value,
+        tolerance: &Value,
+    ) -> Self {
+        let rel = tolerance["rel"].as_f64().unwrap_or(0.0);
+        let abs = tolerance["abs"].as_f64().unwrap_or(0.0);
+        let pairs = match (expected, &computed) {
+            (Value::Object(e), Value::Object(_)) if !e.keys().all(|k| k.parse::<u64>().is_ok()) => {
+                COMPARED_KEYS
+                    .iter()
+                    .filter(|key| e.contains_key(**key))
+                    .map(|key| {
+                        let floor = if *key == "torque_on_tool_Nm" {
+                            LEVER * largest(&e["force_on_tool_N"])
+                        } else {
+                            0.0
+                        };
+                        (e[*key].clone(), computed[*key].clone(), floor)
+                    })
+                    .collect()
+            }
+            _ => vec![(expected.clone(), computed.clone(), 0.0)],
+        };
+        let mut within = !pairs.is_empty();
+        let mut error_rel: f64 = if pairs.is_empty() { f64::INFINITY } else { 0.0 };
+        for (expected, computed, floor) in &pairs {
+            match difference(expected, computed) {
+                Some((largest_difference, largest_entry)) => {
+                    let largest_entry = largest_entry.max(*floor);
+                    let relative = if largest_difference == 0.0 {
+                        0.0
+                    } else {
+                        largest_difference / largest_entry
+                    };
+                    error_rel = error_rel.max(relative);
+                    within &= largest_difference <= abs.max(rel * largest_entry);
+                }
+                None => {
+                    error_rel = f64::INFINITY;
+                    within = false;
+                }
+            }
+        }
+        Self {
+            name: name.to_owned(),
+            computed,
+            expected: expected.clone(),
+            error_rel,
+            tolerance: tolerance.clone(),
+            within,
+        }
+    }
+
+    /// A yes or no.
+    pub(super) fn verdict(name: &str, yes: bool) -> Self {
+        Self {
+            name: name.to_owned(),
+            computed: json!(yes),
+            expected: json!(true),
+            error_rel: if yes { 0.0 } else { 1.0 },
+            tolerance: json!({ "abs": 0.0 }),
+            within: yes,
+        }
+    }
+
+    /// A text that must be equal.
+    pub(super) fn text(name: &str, computed: &str, expected: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            computed: json!(computed),
+            expected: json!(expected),
+            error_rel: if computed == expected { 0.0 } else { 1.0 },
+            tolerance: json!({ "abs": 0.0 }),
+            within: computed == expected,
+        }
+    }
+
+    /// Makes a failed second condition count.
+    pub(super) fn and(mut self, holds: bool) -> Self {
+        self.within &= holds;
+        self
+    }
+
+    /// Whether the quantity is inside its tolerance.
+    pub fn is_within(&self) -> bool {
+        self.within
+    }
+}
+
+/// m. A torque about a point that the resultant passes through is round-off of cancelling parts;
+/// its error counts against the force on a lever of a millimetre.
+const LEVER: f64 = 1e-3;
+
+/// Keys of an object value that are unique and therefore compared; single nodal forces and the
+/// set of active nodes are not (quadratic elements share a face's force unevenly). Maxima are those
+/// over the points of the 4-point rule and over components.
+const COMPARED_KEYS: [&str; 14] = [
+    "force_on_tool_N",
+    "torque_on_tool_Nm",
+    "sample_displacement_m",
+    "one_pass_planes_at_rest",
+    "max_displacement_m",
+    "peak_force_N",
+    "axis_y_at_peak_m",
+    "min_force_N",
+    "q",
+    "M",
+    "solution_z",
+    "max_principal_strain",
+    "max_von_mises_Pa",
+    "max_rotation_rad",
+];
+
+fn largest(value: &Value) -> f64 {
+    value
+        .as_array()
+        .into_iter()
+        .flatten()
+        .filter_map(Value::as_f64)
+        .fold(0.0, |a, x| a.max(x.abs()))
+}
+
+/// Largest difference and largest expected entry, or `None` if the shapes do not fit or a number
+/// is missing or not finite.
+fn difference(expected: &Value, computed: &Value) -> Option<(f64, f64)> {
+    match (expected, computed) {
+        (Value::Number(e), Value::Number(c)) => {
+            let (e, c) = (e.as_f64()?, c.as_f64()?);
+            Some(((e - c).abs(), e.abs()))
+        }
+        (Value::Array(e), Value::Array(c)) if e.len() == c.len() => {
+            fold(e.iter().zip(c).map(|(e, c)| difference(e, c)))
+        }
+        (Value::Object(e), Value::Object(c)) => {
+            let keys: Vec<&String> = e
+                .keys()
+                .filter(|k| !k.starts_with("active") && *k != "note")
+                .collect();
+            fold(keys.iter().map(|k| difference(&e[*k], c.get(*k)?)))
+        }
+        _ => None,
+    }
+}
+
+fn fold(parts: impl Iterator<Item = Option<(f64, f64)>>) -> Option<(f64, f64)> {
+    let mut all = (0.0, 0.0);
+    for part in parts {
+        let (difference, entry) = part?;
+        all = (f64::max(all.0, difference), f64::max(all.1, entry));
+    }
+    Some(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn error_is_relative_to_the_largest_entry() {
+        let q = Quantity::compare(
+            "u",
+            json!([1.0, 1e-9]),
+            &json!([1.0, 0.0]),
+            &json!({"rel": 1e-8}),
+        );
+        assert!(q.is_within());
+        assert!((q.error_rel - 1e-9).abs() < 1e-20);
+    }
+
+    #[test]
+    fn a_missing_or_wrongly_shaped_value_is_never_within() {
+        let tolerance = json!({"rel": 1.0});
+        for computed in [json!(null), json!([1.0]), json!({"a": 1.0}), json!("1")] {
+            assert!(!Quantity::compare("u", computed, &json!([1.0, 2.0]), &tolerance).is_within());
+        }
+        let contact = json!({"force_on_tool_N": [1.0, 0.0, 0.0]});
+        assert!(!Quantity::compare("c", json!({}), &contact, &tolerance).is_within());
+    }
+}

@@ -1,0 +1,128 @@
+//! What can go wrong, by cause, with the data to find it.
+
+use std::path::PathBuf;
+
+use glam::DVec3;
+
+/// Errors of this crate: refused input. A solver's outcome is not an error, see [`crate::lcp::Status`].
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// A length, radius or other size is not finite and positive.
+    #[error("{what} is {value}, it must be finite and above 0")]
+    NotPositive {
+        /// Which quantity, in words.
+        what: &'static str,
+        /// Its value, SI units.
+        value: f64,
+    },
+    /// A value that must be finite is not.
+    #[error("{what} {index} is not finite; remove or repair it")]
+    NotFinite {
+        /// Which quantity, in words.
+        what: &'static str,
+        /// Position in the list it came from.
+        index: usize,
+    },
+    /// A slice has the wrong length.
+    #[error("{what} has {actual} entries, expected {expected}")]
+    Length {
+        /// Which slice.
+        what: &'static str,
+        /// Length needed.
+        expected: usize,
+        /// Length given.
+        actual: usize,
+    },
+    /// The complementarity problem is larger than its scratch.
+    #[error("{rows} contact rows exceed the capacity of {capacity}; make the scratch larger")]
+    Capacity {
+        /// Rows of the problem.
+        rows: usize,
+        /// Rows the scratch was made for.
+        capacity: usize,
+    },
+    /// A mesh file could not be read.
+    #[error("{}: {cause}", path.display())]
+    MeshFile {
+        /// The file.
+        path: PathBuf,
+        /// What the reader said.
+        cause: String,
+    },
+    /// A mesh file of a kind we do not read.
+    #[error("{}: unknown mesh format, use .stl or .obj", path.display())]
+    MeshFormat {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A mesh without any triangle.
+    #[error("the tool mesh has no triangles")]
+    MeshEmpty,
+    /// A triangle names a vertex that does not exist.
+    #[error("triangle {triangle} names vertex {vertex}, the mesh has {n_vertices}")]
+    MeshIndex {
+        /// Triangle, from 0.
+        triangle: usize,
+        /// The vertex it names, from 0.
+        vertex: u32,
+        /// Vertices in the mesh.
+        n_vertices: usize,
+    },
+    /// A triangle without area between three different points.
+    #[error("tool mesh triangle {triangle} at {position} m has no area; repair the mesh")]
+    MeshZeroArea {
+        /// Triangle, from 0.
+        triangle: usize,
+        /// Its centre, m.
+        position: DVec3,
+    },
+    /// An edge with one triangle only: inside and outside are undefined.
+    #[error(
+        "tool mesh is open at the edge from {start} to {end} m ({n_edges} open edges); close it"
+    )]
+    MeshOpen {
+        /// Start of the first open edge, m.
+        start: DVec3,
+        /// End of the first open edge, m.
+        end: DVec3,
+        /// How many open edges there are.
+        n_edges: usize,
+    },
+    /// An edge shared by more than two triangles.
+    #[error(
+        "tool mesh edge from {start} to {end} m is shared by {n_triangles} triangles; two are needed"
+    )]
+    MeshEdgeNotManifold {
+        /// Start of the edge, m.
+        start: DVec3,
+        /// End of the edge, m.
+        end: DVec3,
+        /// Triangles on it.
+        n_triangles: usize,
+    },
+    /// Two pieces of surface touch in a single vertex.
+    #[error("tool mesh surfaces touch in the single vertex {position} m; separate them")]
+    MeshVertexNotManifold {
+        /// The vertex, m.
+        position: DVec3,
+    },
+    /// A one-sided surface, as a Moebius strip.
+    #[error("tool mesh has no consistent outside, see the edge from {start} to {end} m")]
+    MeshNotOrientable {
+        /// Start of an edge where the sides contradict, m.
+        start: DVec3,
+        /// End of that edge, m.
+        end: DVec3,
+    },
+    /// A closed mesh that encloses nothing.
+    #[error("tool mesh encloses no volume; it needs an inside")]
+    MeshNoVolume,
+}
+
+pub(crate) fn check_positive(what: &'static str, value: f64) -> Result<f64, Error> {
+    if value.is_finite() && value > 0.0 {
+        Ok(value)
+    } else {
+        Err(Error::NotPositive { what, value })
+    }
+}

@@ -1,0 +1,123 @@
+//! What a haptic device is to the loop: a pose to read, a wrench to render, and limits.
+
+use glam::DVec3;
+use glamx::DPose3;
+
+use crate::error::DeviceError;
+use crate::wrench::Wrench;
+
+/// What a device reports of its handle at one time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HandleState {
+    /// Pose of the handle in the device's frame; its origin is the handle point. m, unit quaternion.
+    pub pose: DPose3,
+    /// Velocity of the handle point in the device's frame, m/s.
+    pub linear_velocity: DVec3,
+    /// Angular velocity in the axes of the device's frame, rad/s.
+    pub angular_velocity: DVec3,
+    /// Time of the sample on the loop's clock, s.
+    pub time_s: f64,
+    /// Buttons of the handle, one bit each, bit 0 first; 1 is pressed.
+    pub buttons: u32,
+}
+
+impl HandleState {
+    /// At rest at a pose at time 0, no button pressed.
+    #[must_use]
+    pub fn at_rest(pose: DPose3) -> Self {
+        Self {
+            pose,
+            linear_velocity: DVec3::ZERO,
+            angular_velocity: DVec3::ZERO,
+            time_s: 0.0,
+            buttons: 0,
+        }
+    }
+
+    /// Are pose, velocities and time all finite?
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.pose.translation.is_finite()
+            && self.pose.rotation.is_finite()
+            && self.linear_velocity.is_finite()
+            && self.angular_velocity.is_finite()
+            && self.time_s.is_finite()
+    }
+}
+
+/// What a device's hardware can do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Half the workspace along each axis of the device's frame, m.
+    pub workspace_half_extents: DVec3,
+    /// Force that can be held for ever, N.
+    pub continuous_force: f64,
+    /// Largest force, for a short time, N.
+    pub peak_force: f64,
+    /// Largest torque, N m. No longer-term limit on torque is modelled.
+    pub peak_torque: f64,
+    /// Smallest change of position that is reported, m. 0: not stated, positions pass unrounded.
+    pub position_resolution: f64,
+    /// Smallest change of force that is rendered, N. 0: not stated, forces pass unrounded.
+    pub force_resolution: f64,
+    /// Smallest change of orientation that is reported, rad. 0: not stated.
+    pub rotation_resolution: f64,
+    /// Largest stiffness the maker says can be rendered, N/m; `None` where none is stated.
+    pub max_stiffness: Option<f64>,
+}
+
+impl Limits {
+    /// The Virtuose 6D as the paper describes it.
+    ///
+    /// Workspace about a cube of 0.40 m side, 10 N continuous, 35 N peak in steps of 0.2 N, 3.1 N m,
+    /// orientation to 3e-5 rad. The paper gives neither a resolution of position nor a largest
+    /// stiffness: they are 0 (unrounded) and `None` here; set `position_resolution` to study its effect.
+    ///
+    /// Source: Duriez, Andriot, Kheddar 2004, section 5.1.
+    #[must_use]
+    pub const fn virtuose_6d() -> Self {
+        Self {
+            workspace_half_extents: DVec3::splat(0.20),
+            continuous_force: 10.0,
+            peak_force: 35.0,
+            peak_torque: 3.1,
+            position_resolution: 0.0,
+            force_resolution: 0.2,
+            rotation_resolution: 3e-5,
+            max_stiffness: None,
+        }
+    }
+}
+
+/// A device that reports the pose of a handle and renders a wrench on it.
+///
+/// The loop calls [`read`](Self::read) and then [`write`](Self::write) once a period from one thread.
+/// A driver promises:
+/// - `read` and `write` neither allocate nor block for longer than a fraction of the period (on the way
+///   without errors);
+/// - should no `write` come for about 0.1 s, the rendered wrench goes to zero by itself, smoothly: the
+///   loop may have died with the process;
+/// - a wrench that is not finite is refused, whatever stands before the driver.
+pub trait HapticDevice: Send {
+    /// Name of the device for people, constant.
+    fn name(&self) -> &str;
+
+    /// What the hardware can do, constant.
+    fn limits(&self) -> &Limits;
+
+    /// The state of the handle at the loop's time `time_s` (s, never falling).
+    ///
+    /// # Errors
+    /// Where no sample could be had; the caller goes on with the last good one.
+    fn read(&mut self, time_s: f64) -> Result<HandleState, DeviceError>;
+
+    /// Renders a wrench on the handle, about the handle point, until the next call.
+    ///
+    /// # Errors
+    /// Where the wrench could not be rendered.
+    fn write(&mut self, wrench_on_handle: &Wrench) -> Result<(), DeviceError>;
+
+    /// Zero force now, and none until the next `write`. Called at the end of the loop, also after a
+    /// failure; must not fail.
+    fn stop(&mut self);
+}

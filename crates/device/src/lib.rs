@@ -1,0 +1,97 @@
+//! Haptic devices and the loop that serves them: pose in, wrench out, a thousand times a second.
+//!
+//! The way of one period:
+//!
+//! ```text
+//! clock ── release ──> device.read ── pose ──> safety ──> simulation (closure)
+//!                      device.write <── wrench ── safety <──────┘
+//! ```
+//!
+//! - [`HapticDevice`] is what a driver offers, [`Limits`] what its hardware can do.
+//! - [`driver::simulated`] is a device that needs no hardware: the figures of a Virtuose 6D, held by
+//!   the scripted [`SimulatedHand`].
+//! - [`VirtualCoupling`] ties the simulated tool to the handle.
+//! - [`Safety`] stands between the simulation and the hand: no wrench beyond the limits, nothing that
+//!   is not finite, no jump; each intervention is counted.
+//! - [`Servo`] runs the loop on a [`Clock`]: [`RealTime`], [`AsFastAsPossible`] or, in tests,
+//!   [`Driven`]. The loop sees the same times on each, so a headless run and a felt one are the same
+//!   computation.
+//!
+//! This crate knows poses, wrenches and time, and nothing of meshes or contacts.
+//!
+//! Units are SI. Poses are those of the handle in the device's frame; a wrench is the one *on the
+//! handle* about the handle point, in the axes of the device's frame.
+//!
+//! # Example
+//!
+//! A simulated hand pushes the handle 10 mm down onto a spring wall of 1 kN/m that starts 5 mm below:
+//!
+//! ```
+//! use device::{
+//!     AsFastAsPossible, DeviceError, HandSettings, Insertion, Script, Servo, ServoSettings,
+//!     Simulated, SimulatedSettings, SimulatedHand, Wrench, HapticDevice,
+//! };
+//! use glam::DVec3;
+//! use glamx::DPose3;
+//!
+//! # fn main() -> Result<(), DeviceError> {
+//! let period_s = 1e-3;
+//! let script = Script::new(&Insertion {
+//!     start: DPose3::IDENTITY,
+//!     direction: DVec3::NEG_Z,
+//!     speed: 0.05,
+//!     travel: 0.010,
+//!     hold_s: 0.5,
+//!     retract: false,
+//! })?;
+//! let periods = script.periods(period_s);
+//! let hand = SimulatedHand::new(HandSettings::default(), script, period_s)?;
+//! let mut device = Simulated::new(SimulatedSettings::default(), hand)?;
+//!
+//! let clock = AsFastAsPossible::new(period_s)?;
+//! let mut servo = Servo::new(clock, ServoSettings::for_limits(device.limits()))?;
+//! let mut force = 0.0;
+//! let report = servo.run_periods(&mut device, periods, |handle| {
+//!     let depth = (-0.005 - handle.pose.translation.z).max(0.0);
+//!     force = 1000.0 * depth;
+//!     Wrench::new(DVec3::new(0.0, 0.0, force), DVec3::ZERO)
+//! })?;
+//!
+//! assert_eq!(report.periods, periods);
+//! // Grip (2 kN/m) and wall share the remaining 5 mm: 5 mm / (1/2000 + 1/1000) = 3.33 N,
+//! // rendered in steps of 0.2 N.
+//! assert!((force - 3.33_f64).abs() < 0.2);
+//! # Ok(())
+//! # }
+//! ```
+#![cfg_attr(
+    test,
+    allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")
+)]
+
+pub mod driver;
+
+mod clock;
+mod coupling;
+mod error;
+mod hand;
+mod haptic_device;
+mod histogram;
+mod safety;
+mod script;
+mod servo;
+mod wrench;
+
+pub use clock::{AsFastAsPossible, Clock, Driven, RealTime, Release};
+pub use coupling::{
+    STIFFNESS_MAX, VirtualCoupling, largest_stiffness_for_damping, largest_stiffness_for_friction,
+};
+pub use driver::simulated::{Simulated, SimulatedEvents, SimulatedSettings};
+pub use error::DeviceError;
+pub use hand::{HandSettings, SimulatedHand};
+pub use haptic_device::{HandleState, HapticDevice, Limits};
+pub use histogram::{TimeHistogram, TimeSummary};
+pub use safety::{Safety, SafetyEvents, SafetySettings, Watchdog};
+pub use script::{Insertion, Phase, Script, Target};
+pub use servo::{PeriodRecord, Servo, ServoReport, ServoSettings};
+pub use wrench::{Wrench, rotation_from_vector, rotation_vector};

@@ -1,0 +1,125 @@
+//! What can be wrong with a mesh, a material or a stiffness.
+
+/// Errors of this crate. The text says what, where and the mend.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The mesh file is not what it should be.
+    #[error("{place}: {what}")]
+    Format {
+        /// Line (ASCII) or byte (binary).
+        place: String,
+        /// What is wrong there, and the mend.
+        what: String,
+    },
+    /// The mesh file has another version than 4.1.
+    #[error(
+        "MSH version {found} is not read; convert it with `gmsh {file} -save -format msh41 -o {file}`"
+    )]
+    Version {
+        /// As in the file.
+        found: String,
+        /// Name of the file.
+        file: String,
+    },
+    /// No tetrahedra.
+    #[error(
+        "the mesh has no tetrahedra of order 1, 2 or 3{found}; mesh the volume with `gmsh -3 -order 2 -format msh41`"
+    )]
+    NoTetrahedra {
+        /// Other kinds that were found, or nothing.
+        found: String,
+    },
+    /// Elements of several orders.
+    #[error("the mesh mixes tetrahedra of orders {0} and {1}; make it anew with one `-order`")]
+    MixedOrders(u8, u8),
+    /// A coordinate that is not a number.
+    #[error("node {tag} has a coordinate that is not finite")]
+    CoordinateNotFinite {
+        /// Tag in the file.
+        tag: u64,
+    },
+    /// An element of negative or no volume.
+    #[error(
+        "element {tag} is inverted or has no volume (smallest Jacobian {jacobian:.3e} m³{more}); \
+         repair the mesh, or make it anew with `-optimize_ho` if it is curved"
+    )]
+    Inverted {
+        /// Tag in the file.
+        tag: u64,
+        /// m³: smallest bound of the determinant of the Jacobian.
+        jacobian: f64,
+        /// " and N more", or nothing.
+        more: String,
+    },
+    /// Nothing holds the body, or too little does.
+    #[error(
+        "the body is not held: free rigid motion {motions}; name a group of nodes in `fixed` that stops it"
+    )]
+    FreeRigidMotion {
+        /// The motions in words.
+        motions: String,
+    },
+    /// A part of the mesh is not joined to the rest and not held.
+    #[error(
+        "disconnected, loose piece: {elements} elements around element {tag} are joined to nothing that is \
+         `fixed` (free rigid motion {motions}); join the piece, hold it, or delete it"
+    )]
+    LoosePiece {
+        /// Tag of an element of the piece.
+        tag: u64,
+        /// Elements of the piece.
+        elements: usize,
+        /// The motions in words.
+        motions: String,
+    },
+    /// A material constant out of range.
+    #[error("{name} = {value} {rule}")]
+    Material {
+        /// Name of the constant.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it must be.
+        rule: &'static str,
+    },
+    /// A group has no faces to load.
+    #[error("group {0:?} has no faces, so no load can act on it")]
+    NoFaces(String),
+    /// The factorisation met a pivot that is not positive.
+    #[error(
+        "the stiffness is not positive definite (pivot {pivot}): the body is not held, or its elements are degenerate"
+    )]
+    NotPositiveDefinite {
+        /// Number of the pivot.
+        pivot: usize,
+    },
+    /// The solver has not enough memory or refuses the size.
+    #[error("the factorisation does not fit: {0}")]
+    TooLarge(String),
+    /// A check after the build failed.
+    #[error(
+        "the compliance fails its check: {what} is {value:.1e}, must be below {limit:.0e}; the part is too badly conditioned"
+    )]
+    CheckFailed {
+        /// Which check.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// Its limit.
+        limit: f64,
+    },
+    /// A point outside of the mesh.
+    #[error("the point {0:?} m is in no element")]
+    OutsideMesh([f64; 3]),
+    /// The user stopped it.
+    #[error("stopped")]
+    Cancelled,
+}
+
+impl Error {
+    /// Whether the user stopped the work.
+    pub fn is_cancelled(&self) -> bool {
+        matches!(self, Self::Cancelled)
+    }
+}

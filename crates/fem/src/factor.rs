@@ -1,0 +1,197 @@
+//! Sparse Cholesky factor of the free degrees of freedom.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::{LltError, LltRegularization};
+use faer::sparse::linalg::cholesky::{
+    LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+};
+use faer::sparse::{SparseColMat, SymbolicSparseColMat};
+use faer::{Conj, MatMut, Par, Side};
+
+use crate::Error;
+use crate::assembly::Stiffness;
+use crate::progress::Progress;
+use crate::supports::Supports;
+
+/// Degree of freedom that is held.
+const HELD: u32 = u32::MAX;
+
+/// K_ff = L Lᵀ for the free degrees of freedom f.
+#[derive(Debug)]
+pub struct FactoredStiffness {
+    symbolic: SymbolicCholesky<u32>,
+    values: Vec<f64>,
+    /// Place of each degree of freedom among the free ones, or [`HELD`].
+    free_of_dof: Vec<u32>,
+    dof_of_free: Vec<u32>,
+}
+
+impl FactoredStiffness {
+    /// Eliminates the held degrees of freedom (and nodes of no element) and factors.
+    ///
+    /// # Errors
+    /// [`Error::NotPositiveDefinite`], [`Error::TooLarge`], [`Error::Cancelled`].
+    pub fn new(
+        stiffness: &Stiffness,
+        supports: &Supports,
+        progress: &dyn Progress,
+    ) -> Result<Self, Error> {
+        let n = stiffness.n_dofs();
+        let mut free_of_dof = vec![HELD; n];
+        let mut dof_of_free = Vec::new();
+        for dof in 0..n {
+            let has_stiffness = stiffness.column(dof).any(|(i, v)| i == dof && v != 0.0);
+            if !supports.is_fixed(dof) && has_stiffness {
+                free_of_dof[dof] = dof_of_free.len() as u32;
+                dof_of_free.push(dof as u32);
+            }
+        }
+        let lower = lower_triangle(stiffness, &free_of_dof, &dof_of_free);
+
+        progress.advance("order the unknowns", 0, 1);
+        let symbolic = factorize_symbolic_cholesky(
+            lower.symbolic(),
+            Side::Lower,
+            SymmetricOrdering::Amd,
+            Default::default(),
+        )
+        .map_err(|e| Error::TooLarge(format!("{e:?}")))?;
+        if progress.is_cancelled() {
+            return Err(Error::Cancelled);
+        }
+        progress.advance("factor", 0, 1);
+        let mut values = vec![0.0; symbolic.len_val()];
+        // One thread: the factor is the same bits on every machine with the same instructions.
+        let par = Par::Seq;
+        let mut memory = MemBuffer::try_new(
+            symbolic.factorize_numeric_llt_scratch::<f64>(par, Default::default()),
+        )
+        .map_err(|_| Error::TooLarge("no memory for the factorisation".to_owned()))?;
+        symbolic
+            .factorize_numeric_llt::<f64>(
+                &mut values,
+                lower.as_ref(),
+                Side::Lower,
+                LltRegularization::default(),
+                par,
+                MemStack::new(&mut memory),
+                Default::default(),
+            )
+            .map_err(
+                |LltError::NonPositivePivot { index }| Error::NotPositiveDefinite { pivot: index },
+            )?;
+        if progress.is_cancelled() {
+            return Err(Error::Cancelled);
+        }
+        progress.advance("factor", 1, 1);
+        Ok(Self {
+            symbolic,
+            values,
+            free_of_dof,
+            dof_of_free,
+        })
+    }
+
+    /// Number of degrees of freedom, held ones included.
+    pub fn n_dofs(&self) -> usize {
+        self.free_of_dof.len()
+    }
+
+    /// Number of free degrees of freedom.
+    pub fn n_free(&self) -> usize {
+        self.dof_of_free.len()
+    }
+
+    /// Entries of L.
+    pub fn n_factor_entries(&self) -> usize {
+        self.symbolic.len_val()
+    }
+
+    /// Place among the free degrees of freedom, if free.
+    pub(crate) fn free_of(&self, dof: usize) -> Option<usize> {
+        let free = self.free_of_dof[dof];
+        (free != HELD).then_some(free as usize)
+    }
+
+    /// Solves for several right-hand sides in place, one column each, in free degrees of freedom.
+    pub(crate) fn solve_in_place(&self, rhs: MatMut<'_, f64>, memory: &mut MemBuffer) {
+        LltRef::<u32, f64>::new(&self.symbolic, &self.values).solve_in_place_with_conj(
+            Conj::No,
+            rhs,
+            Par::Seq,
+            MemStack::new(memory),
+        );
+    }
+
+    /// Memory for [`Self::solve_in_place`].
+    pub(crate) fn solve_memory(&self, n_rhs: usize) -> MemBuffer {
+        MemBuffer::new(self.symbolic.solve_in_place_scratch::<f64>(n_rhs, Par::Seq))
+    }
+
+    /// Displacement of all degrees of freedom (zero where held) under forces on all of them
+    /// (ignored where held), m and N.
+    pub fn solve(&self, force: &[f64]) -> Vec<f64> {
+        let mut x: Vec<f64> = self
+            .dof_of_free
+            .iter()
+            .map(|&dof| force[dof as usize])
+            .collect();
+        let mut memory = self.solve_memory(1);
+        let n = x.len();
+        self.solve_in_place(
+            MatMut::from_column_major_slice_mut(&mut x, n, 1),
+            &mut memory,
+        );
+        let mut u = vec![0.0; self.n_dofs()];
+        for (&dof, x) in self.dof_of_free.iter().zip(x) {
+            u[dof as usize] = x;
+        }
+        u
+    }
+
+    /// As [`Self::solve`], with the held degrees of freedom displaced as prescribed.
+    pub fn solve_prescribed(
+        &self,
+        stiffness: &Stiffness,
+        force: &[f64],
+        prescribed: &[f64],
+    ) -> Vec<f64> {
+        let mut held = vec![0.0; self.n_dofs()];
+        for (dof, value) in held.iter_mut().enumerate() {
+            if self.free_of_dof[dof] == HELD {
+                *value = prescribed[dof];
+            }
+        }
+        let reaction = stiffness.multiply(&held);
+        let rhs: Vec<f64> = force.iter().zip(reaction).map(|(f, r)| f - r).collect();
+        let mut u = self.solve(&rhs);
+        for (u, held) in u.iter_mut().zip(held) {
+            *u += held;
+        }
+        u
+    }
+}
+
+fn lower_triangle(
+    stiffness: &Stiffness,
+    free_of_dof: &[u32],
+    dof_of_free: &[u32],
+) -> SparseColMat<u32, f64> {
+    let n = dof_of_free.len();
+    let mut starts = vec![0u32];
+    let (mut rows, mut values) = (Vec::new(), Vec::new());
+    for (j, &dof) in dof_of_free.iter().enumerate() {
+        for (i, v) in stiffness.column(dof as usize) {
+            let free = free_of_dof[i];
+            if free != HELD && free as usize >= j {
+                rows.push(free);
+                values.push(v);
+            }
+        }
+        starts.push(rows.len() as u32);
+    }
+    SparseColMat::new(
+        SymbolicSparseColMat::new_checked(n, n, starts, None, rows),
+        values,
+    )
+}

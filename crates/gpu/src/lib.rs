@@ -1,0 +1,49 @@
+//! The dense multiply of the display: surface compliance times contact forces.
+//!
+//! ```text
+//! u = Σ_j C[:, j] f_j        j over the candidates that carry force
+//! ```
+//! C is the compliance of the whole surface under unit forces at the candidates (m/N), f the forces (N),
+//! u the displacement of the surface (m). The product reads each number of C once, so what counts is
+//! how much memory is read and in which order. [`Layout`] says where each number lies,
+//! [`Multiply`] is what a back-end offers, [`Cpu`] the back-end on the processor with C kept in 64 or
+//! 32 bits.
+//!
+//! # Example
+//!
+//! Two rows, one candidate (row 0), compliance 2 mm/N at itself and 1 mm/N at the other row, along each
+//! axis:
+//!
+//! ```
+//! use gpu::{Layout, Multiply, Scalar, on_cpu};
+//!
+//! # fn main() -> Result<(), gpu::Error> {
+//! let layout = Layout::new(2, 1)?;
+//! let mut blocks = vec![0.0; layout.n_scalars()];
+//! for (row, compliance) in [(0, 2e-3), (1, 1e-3)] {
+//!     for axis in 0..3 {
+//!         blocks[Layout::block_offset(2, row, 0) + 4 * axis] = compliance;
+//!     }
+//! }
+//! let mut multiply = on_cpu(layout, &blocks, Scalar::F64)?;
+//!
+//! let mut displacement = [0.0; 6];
+//! multiply.multiply_into(&[0], &[0.0, 0.0, -10.0], &mut displacement)?;
+//! assert_eq!(displacement, [0.0, 0.0, -0.02, 0.0, 0.0, -0.01]);
+//! # Ok(())
+//! # }
+//! ```
+#![cfg_attr(
+    test,
+    allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")
+)]
+
+mod cpu;
+mod error;
+mod layout;
+mod multiply;
+
+pub use cpu::{Cpu, Stored, on_cpu};
+pub use error::Error;
+pub use layout::Layout;
+pub use multiply::{Multiply, Scalar};

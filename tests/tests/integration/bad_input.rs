@@ -1,0 +1,233 @@
+//! Input that cannot be used is refused with file, place and mend, exit code 2, and nothing lost.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use snapin_tests::{Outcome, arg, root, snapin};
+
+/// A folder with the clip's scene and mesh, the scene changed by `edit`.
+fn scene_with(dir: &Path, edit: impl Fn(&str) -> String) -> PathBuf {
+    for file in ["clip.toml", "clip.msh"] {
+        fs::copy(root().join("scenes").join(file), dir.join(file)).unwrap();
+    }
+    let path = dir.join("clip.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    let edited = edit(&text);
+    assert_ne!(text, edited, "the edit changed nothing");
+    fs::write(&path, edited).unwrap();
+    path
+}
+
+fn run(scene: &Path) -> Outcome {
+    let out = scene.with_file_name("result");
+    let outcome = snapin(&["run", arg(scene), "--out", arg(&out), "--no-cache"]);
+    assert!(!out.exists(), "a refused run leaves no result");
+    let left: Vec<_> = fs::read_dir(scene.parent().unwrap())
+        .unwrap()
+        .map(|e| e.unwrap().file_name().into_string().unwrap())
+        .filter(|name| name.contains("partial"))
+        .collect();
+    assert!(left.is_empty(), "left behind: {left:?}");
+    outcome
+}
+
+/// Replaces the value of a key, wherever it stands.
+fn set(text: &str, key: &str, value: &str) -> String {
+    text.lines()
+        .map(|line| {
+            if line
+                .trim_start()
+                .strip_prefix(key)
+                .is_some_and(|rest| rest.trim_start().starts_with('='))
+            {
+                format!("{key} = {value}\n")
+            } else {
+                format!("{line}\n")
+            }
+        })
+        .collect()
+}
+
+#[test]
+fn a_wrong_value_names_file_line_and_mend() {
+    // key, value, what the message must name beside the file and a line number
+    let cases = [
+        ("poisson_ratio", "0.5", "below 0.5"),
+        ("poisson_ratio", "nan", "poisson_ratio"),
+        ("young_modulus", "0.0", "young_modulus"),
+        ("young_modulus", "-2.7e9", "young_modulus"),
+        ("young_modulus", "\"stiff\"", "young_modulus"),
+        ("radius", "inf", "radius"),
+        ("speed", "0.0", "speed"),
+        ("mesh", "\"nowhere.msh\"", "nowhere.msh"),
+        ("shape", "\"cilinder\"", "cylinder"),
+        ("direction", "[0.0, 0.0, 0.0]", "direction"),
+    ];
+    for (key, value, names) in cases {
+        let dir = tempfile::tempdir().unwrap();
+        let scene = scene_with(dir.path(), |text| set(text, key, value));
+        let outcome = run(&scene);
+        assert_eq!(outcome.code, 2, "{key} = {value}: {}", outcome.err);
+        assert!(
+            outcome.err.contains("clip.toml:"),
+            "{key} = {value}: {}",
+            outcome.err
+        );
+        assert!(
+            outcome.err.contains(names),
+            "{key} = {value}: {}",
+            outcome.err
+        );
+        let place = outcome.err.split("clip.toml:").nth(1).unwrap();
+        assert!(
+            place.starts_with(|c: char| c.is_ascii_digit()),
+            "no line: {}",
+            outcome.err
+        );
+    }
+}
+
+#[test]
+fn an_unknown_key_names_the_nearest_one() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = scene_with(dir.path(), |text| {
+        text.replacen("poisson_ratio", "poison_ratio", 1)
+    });
+    let outcome = run(&scene);
+    assert_eq!(outcome.code, 2);
+    assert!(
+        outcome.err.contains("poison_ratio") && outcome.err.contains("poisson_ratio"),
+        "{}",
+        outcome.err
+    );
+}
+
+#[test]
+fn a_region_that_is_not_in_the_mesh_names_those_that_are() {
+    for key in ["fixed", "contact"] {
+        let dir = tempfile::tempdir().unwrap();
+        let scene = scene_with(dir.path(), |text| set(text, key, "\"nose\""));
+        let outcome = run(&scene);
+        assert_eq!(outcome.code, 2, "{}", outcome.err);
+        for word in ["nose", key, "surface", "clip.msh"] {
+            assert!(outcome.err.contains(word), "{key}: {}", outcome.err);
+        }
+    }
+}
+
+#[test]
+fn a_tool_that_starts_inside_the_part_is_refused_with_the_mend() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = scene_with(dir.path(), |text| {
+        set(text, "position", "[0.0, 0.010, 0.005]")
+    });
+    let outcome = run(&scene);
+    assert_eq!(outcome.code, 2, "{}", outcome.err);
+    assert!(
+        outcome.err.contains("starts inside") && outcome.err.contains("tool.position"),
+        "{}",
+        outcome.err
+    );
+}
+
+#[test]
+fn a_damaged_mesh_is_refused_wherever_it_is_damaged() {
+    let mesh = fs::read(root().join("scenes/clip.msh")).unwrap();
+    for keep in [
+        0,
+        10,
+        60,
+        400,
+        mesh.len() / 4,
+        mesh.len() / 2,
+        mesh.len() - 200,
+    ] {
+        let dir = tempfile::tempdir().unwrap();
+        let scene = scene_with(dir.path(), |text| format!("{text}\n# cut\n"));
+        fs::write(dir.path().join("clip.msh"), &mesh[..keep]).unwrap();
+        let outcome = run(&scene);
+        assert_eq!(outcome.code, 2, "cut to {keep} bytes: {}", outcome.err);
+        assert!(outcome.err.contains("clip.msh"), "{}", outcome.err);
+    }
+}
+
+#[test]
+fn a_folder_of_other_files_and_an_earlier_result_are_kept() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = scene_with(dir.path(), |text| set(text, "poisson_ratio", "0.5"));
+    let out = dir.path().join("out");
+    fs::create_dir(&out).unwrap();
+    fs::write(out.join("summary.json"), "earlier").unwrap();
+    let outcome = snapin(&["run", arg(&scene), "--out", arg(&out), "--no-cache"]);
+    assert_eq!(outcome.code, 2);
+    assert_eq!(
+        fs::read_to_string(out.join("summary.json")).unwrap(),
+        "earlier"
+    );
+
+    let thesis = dir.path().join("thesis");
+    fs::create_dir(&thesis).unwrap();
+    fs::write(thesis.join("chapter.tex"), "years").unwrap();
+    let good = root().join("scenes/clip.toml");
+    let outcome = snapin(&["run", arg(&good), "--out", arg(&thesis), "--no-cache"]);
+    assert_eq!(outcome.code, 2, "{}", outcome.err);
+    assert!(outcome.err.contains("--out"), "{}", outcome.err);
+    assert!(thesis.join("chapter.tex").exists());
+
+    let file = dir.path().join("file");
+    fs::write(&file, "x").unwrap();
+    let outcome = snapin(&[
+        "run",
+        arg(&good),
+        "--out",
+        arg(&file.join("below")),
+        "--no-cache",
+    ]);
+    assert_eq!(outcome.code, 2, "{}", outcome.err);
+}
+
+#[test]
+fn a_damaged_cache_is_rebuilt_with_a_line_that_says_so() {
+    let dir = tempfile::tempdir().unwrap();
+    let cache = dir.path().join("cache");
+    let scene = root().join("scenes/clip.toml");
+    let prepare = || snapin(&["prepare", arg(&scene), "--cache", arg(&cache)]);
+    assert_eq!(prepare().code, 0);
+    let file = fs::read_dir(&cache)
+        .unwrap()
+        .next()
+        .unwrap()
+        .unwrap()
+        .path();
+    let good = fs::read(&file).unwrap();
+    let outcome = prepare();
+    assert!(outcome.out.contains("read from"), "{}", outcome.out);
+
+    let mut flipped = good.clone();
+    let middle = flipped.len() / 2;
+    flipped[middle] ^= 1;
+    for damaged in [&flipped[..], &good[..good.len() / 3], &[]] {
+        fs::write(&file, damaged).unwrap();
+        let outcome = prepare();
+        assert_eq!(outcome.code, 0, "{}", outcome.err);
+        assert!(outcome.err.contains("prepared anew"), "{}", outcome.err);
+        assert!(
+            fs::read(&file).unwrap() == good,
+            "the rebuilt part has the same bytes"
+        );
+    }
+}
+
+#[test]
+fn wrong_arguments_are_usage_errors() {
+    for args in [
+        &["run"][..],
+        &["fly"],
+        &["run", "scenes/none.toml"],
+        &["verify", "/nonexistent"],
+    ] {
+        let outcome = snapin(args);
+        assert_eq!(outcome.code, 2, "{args:?}");
+        assert!(!outcome.err.is_empty());
+    }
+}

@@ -1,0 +1,9 @@
+//! Tests of the whole program through its public interface, one module per subject.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+mod architecture;
+mod bad_input;
+mod docs;
+mod scenes;
+mod verify;

@@ -1,0 +1,112 @@
+//! Every shipped scene is run, and the main things it should show are checked.
+
+use std::path::Path;
+
+use serde_json::Value;
+use snapin_tests::{arg, csv, root, snapin};
+
+fn run_scene(name: &str, out: &Path) -> Value {
+    let scene = root().join("scenes").join(name);
+    let result = snapin(&["run", arg(&scene), "--out", arg(out), "--no-cache"]);
+    assert_eq!(result.code, 0, "{}\n{}", result.out, result.err);
+    serde_json::from_str(&std::fs::read_to_string(out.join("summary.json")).unwrap()).unwrap()
+}
+
+fn column(columns: &[(String, Vec<f64>)], name: &str) -> Vec<f64> {
+    columns.iter().find(|c| c.0 == name).unwrap().1.clone()
+}
+
+/// Snapping is: the force rises from nothing, peaks, falls through zero and comes to rest.
+fn assert_snaps(out: &Path, summary: &Value) {
+    let curve = csv(&out.join("force-travel.csv"));
+    let force = column(&curve, "force_N");
+    let peak_at = (0..force.len())
+        .max_by(|&a, &b| force[a].total_cmp(&force[b]))
+        .unwrap();
+    let peak = force[peak_at];
+    assert_eq!(force[0], 0.0, "free at the start");
+    assert!(peak > 0.0 && peak_at > 0);
+    let lowest = force[peak_at..]
+        .iter()
+        .copied()
+        .fold(f64::INFINITY, f64::min);
+    assert!(lowest < 0.0, "the clip pulls the tool home: {lowest}");
+    let tail = &force[force.len() - 50..];
+    let swing = tail.iter().fold(0.0f64, |a, f| a.max((f - tail[0]).abs()));
+    assert!(
+        swing < 0.01 * peak,
+        "at rest at the end, swings by {swing} N"
+    );
+
+    let number = |key: &str| summary[key].as_f64().unwrap();
+    assert!((number("peak_insertion_force_N") - peak).abs() < 1e-12 * peak);
+    for key in [
+        "insertion_work_J",
+        "snap_travel_m",
+        "coupling_stiffness_N_per_m",
+        "snap_drop_N",
+    ] {
+        assert!(number(key) > 0.0, "{key}");
+    }
+    // Both sides of the tool's equilibrium, every step: nine digits.
+    assert!(
+        number("max_wrench_mismatch_rel") < 1e-9,
+        "{}",
+        number("max_wrench_mismatch_rel")
+    );
+    // Scaled natural residual of every LCP: round-off of problems of about 50 rows.
+    assert!(
+        number("max_certificate") < 1e-10,
+        "{}",
+        number("max_certificate")
+    );
+}
+
+#[test]
+fn the_clip_snaps_and_two_runs_agree_to_the_last_digit() {
+    let dir = tempfile::tempdir().unwrap();
+    let (first, second) = (dir.path().join("first"), dir.path().join("second"));
+    let summary = run_scene("clip.toml", &first);
+    assert_snaps(&first, &summary);
+    // The paper's clip: 686 nodes and 293 quadratic elements (Duriez et al. 2004, 5.2).
+    assert_eq!(summary["order"], 2);
+    assert!(
+        (650..=720).contains(&summary["nodes"].as_u64().unwrap()),
+        "{}",
+        summary["nodes"]
+    );
+    assert!(
+        (270..=320).contains(&summary["elements"].as_u64().unwrap()),
+        "{}",
+        summary["elements"]
+    );
+    for file in [
+        "report.html",
+        "force-travel.csv",
+        "force-travel.svg",
+        "timing.csv",
+        "session.mcap",
+    ] {
+        assert!(first.join(file).is_file(), "{file}");
+    }
+
+    run_scene("clip.toml", &second);
+    let read = |dir: &Path| std::fs::read(dir.join("force-travel.csv")).unwrap();
+    assert!(
+        read(&first) == read(&second),
+        "the curve differs between two runs"
+    );
+}
+
+#[test]
+fn the_hook_snaps_near_its_handbook_force() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("hook");
+    let summary = run_scene("hook.toml", &out);
+    assert_snaps(&out, &summary);
+    let report = std::fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(
+        report.contains("handbook"),
+        "the formula stands beside the curve"
+    );
+}

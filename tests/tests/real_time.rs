@@ -1,0 +1,77 @@
+//! What the haptic step must never do: take memory from the heap, over a whole insertion.
+//!
+//! A file of its own, because it replaces the allocator. Nothing here is timed.
+
+#![allow(unsafe_code, reason = "a counting allocator forwards to the system's")]
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use glamx::DPose3;
+use snapin::prepare::{PrepareOptions, prepare};
+use snapin::progress::Ui;
+use snapin::scene::Scene;
+use snapin::setup;
+use snapin_tests::root;
+
+struct Counting;
+
+static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
+
+// SAFETY: every call is forwarded unchanged to the system's allocator; only a counter is added.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the caller's promises are passed on.
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: the caller's promises are passed on.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the caller's promises are passed on.
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Both scenes, pushed in and pulled out again, a jump of the handle and a pose that is refused.
+#[test]
+fn no_step_of_an_insertion_allocates() {
+    for name in ["clip.toml", "hook.toml"] {
+        let scene = Scene::load(&root().join("scenes").join(name)).unwrap();
+        let mut unseen = std::io::sink();
+        let ui = Ui::new(&mut unseen, false);
+        let prepared = prepare(
+            &setup::part_spec(&scene).unwrap(),
+            &PrepareOptions::default(),
+            &ui,
+        )
+        .unwrap();
+        let (tool, _) = setup::tool(&scene).unwrap();
+        let mut engine = setup::engine(&scene, &prepared, tool).unwrap();
+        let start = scene.tool.pose_part_tool;
+        let at = |share: f64| DPose3 {
+            translation: start.translation + share * scene.hand.travel * scene.hand.direction,
+            ..start
+        };
+        let in_and_out: Vec<f64> = (0..=400)
+            .chain((0..=400).rev())
+            .map(|k| f64::from(k) / 400.0)
+            .collect();
+        let jump = [0.0, 0.3, 0.1, f64::NAN, 0.35];
+        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        let mut touched = 0;
+        for &share in in_and_out.iter().chain(&jump) {
+            touched += u32::from(engine.step(&at(share)).contacts > 0);
+        }
+        let after = ALLOCATIONS.load(Ordering::Relaxed);
+        assert!(touched > 100, "{name}: contact in {touched} steps only");
+        assert_eq!(after - before, 0, "{name}");
+    }
+}

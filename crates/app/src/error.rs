@@ -34,7 +34,7 @@ pub enum Error {
     #[error("compliance multiply: {0}")]
     Multiply(#[from] gpu::Error),
     /// Writing the result.
-    #[error(transparent)]
+    #[error("{0}; make room or name another folder with --out (an earlier result is untouched)")]
     Report(#[from] crate::report::ReportError),
     /// A file or folder that cannot be read or written.
     #[error("{path}: cannot {action}: {source}", path = path.display())]

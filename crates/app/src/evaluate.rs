@@ -434,12 +434,35 @@ impl Story<'_> {
             computed,
             unit: unit.to_owned(),
         };
+        let mut compared = vec![
+            row(
+                "mating force",
+                frictionless.mating_force(young_modulus),
+                peak,
+                "N",
+            ),
+            row(
+                "largest force across",
+                frictionless.deflection_force(young_modulus),
+                across,
+                "N",
+            ),
+        ];
+        if let ToolShape::Cylinder { radius, .. } = self.scene.tool.shape {
+            // A rounded edge leaves the ramp for its corner before the arm is fully bent: there the
+            // bottom of the edge is still r (1 - cos a) above the height of its contact.
+            let alpha = hook.lead_angle_deg.to_radians();
+            let bent = hook.undercut - radius * (1.0 - alpha.cos());
+            if bent > 0.0 {
+                let force = frictionless.mating_force(young_modulus) * bent / hook.undercut;
+                compared.push(row("mating force of a rounded edge", force, peak, "N"));
+            }
+        }
         Some(Handbook {
-            name: "cantilever snap hook: P = (b h²/6) E ε/L, ε = 1.5 h y/L², W = P (μ + tan α)/(1 − μ tan α), without friction".to_owned(),
-            rows: vec![
-                row("mating force", frictionless.mating_force(young_modulus), peak, "N"),
-                row("largest force across", frictionless.deflection_force(young_modulus), across, "N"),
-            ],
+            name: "cantilever snap hook without friction: P = (b h²/6) E ε/L, ε = 1.5 h y/L², \
+                   W = P tan α; a rounded edge of radius r leaves the ramp at y - r (1 - cos α)"
+                .to_owned(),
+            rows: compared,
             curve: frictionless
                 .curve(young_modulus)
                 .iter()

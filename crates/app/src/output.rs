@@ -48,14 +48,20 @@ impl Staging {
                 target.display()
             )));
         };
-        fs::create_dir_all(parent).map_err(Error::io(parent, "create the folder for results"))?;
+        fs::create_dir_all(parent).map_err(Error::io(
+            parent,
+            "create the folder for results (name another with --out)",
+        ))?;
         let partial = parent.join(format!(
             ".{}.partial-{}",
             name.to_string_lossy(),
             std::process::id()
         ));
         let _ = fs::remove_dir_all(&partial);
-        fs::create_dir(&partial).map_err(Error::io(&partial, "create the result folder"))?;
+        fs::create_dir(&partial).map_err(Error::io(
+            &partial,
+            "create the result folder (name another with --out)",
+        ))?;
         Ok(Self {
             target: absolute,
             partial,

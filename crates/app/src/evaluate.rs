@@ -600,3 +600,13 @@ impl Moments {
         moments
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn report_and_engine_name_the_same_stages() {
+        assert_eq!(crate::report::STAGE_NAMES, Stage::ALL.map(Stage::name));
+    }
+}

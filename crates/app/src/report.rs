@@ -18,7 +18,7 @@ mod font;
 #[cfg(test)]
 mod sample;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 pub use curve::Curve;
 pub use data::{
@@ -31,29 +31,36 @@ pub use error::ReportError;
 ///
 /// Files: `report.html`, `force-travel.csv`, `force-travel.svg`, `timing.csv`, `step-time.svg`,
 /// `summary.json`, `session.mcap`, and below `frames` for each frame `NN-label.png` (displacement),
-/// `NN-label-stress.png` and `NN-label.vtu`; the larger ones as [`Outputs`] asks.
+/// `NN-label-stress.png` and `NN-label.vtu`; the larger ones as [`Outputs`] asks. Returns the
+/// paths of what was written, in the order of writing. The same run gives the same bytes.
 ///
 /// # Errors
 /// The first file that cannot be made, with its path and the cause.
-pub fn write_all(dir: &Path, run: &Run) -> Result<(), ReportError> {
+pub fn write_all(dir: &Path, run: &Run) -> Result<Vec<PathBuf>, ReportError> {
     run_is_consistent(run)?;
+    let mut written = Vec::new();
     let curve = Curve::of(&run.rows);
 
     write_file(
+        &mut written,
         &dir.join("force-travel.csv"),
         csv::force_travel(&run.rows).as_bytes(),
     )?;
-    write_file(&dir.join("timing.csv"), csv::timing(&run.rows).as_bytes())?;
+    write_file(
+        &mut written,
+        &dir.join("timing.csv"),
+        csv::timing(&run.rows).as_bytes(),
+    )?;
     let summary = summary::json(run, &curve);
-    write_file(&dir.join("summary.json"), summary.as_bytes())?;
+    write_file(&mut written, &dir.join("summary.json"), summary.as_bytes())?;
 
     let force_path = dir.join("force-travel.svg");
     let force_svg =
         plot::force_travel(run, &curve).map_err(|e| ReportError::plot(&force_path, e))?;
-    write_file(&force_path, force_svg.as_bytes())?;
+    write_file(&mut written, &force_path, force_svg.as_bytes())?;
     let time_path = dir.join("step-time.svg");
     let time_svg = plot::step_time(&run.rows).map_err(|e| ReportError::plot(&time_path, e))?;
-    write_file(&time_path, time_svg.as_bytes())?;
+    write_file(&mut written, &time_path, time_svg.as_bytes())?;
 
     let frames_dir = dir.join("frames");
     if !run.frames.is_empty() && (run.outputs.png || run.outputs.vtu) {
@@ -64,20 +71,20 @@ pub fn write_all(dir: &Path, run: &Run) -> Result<(), ReportError> {
     }
     let mut pictures = Vec::new();
     if run.outputs.png {
-        pictures = write_pictures(&frames_dir, run)?;
+        pictures = write_pictures(&mut written, &frames_dir, run)?;
     }
     if run.outputs.vtu {
         for (idx, frame) in run.frames.iter().enumerate() {
             let path = frames_dir.join(format!("{}.vtu", frame_stem(idx, frame)));
             let bytes =
                 vtu::frame(&run.part, frame).map_err(|cause| ReportError::shape(&path, cause))?;
-            write_file(&path, &bytes)?;
+            write_file(&mut written, &path, &bytes)?;
         }
     }
     if run.outputs.mcap {
         let path = dir.join("session.mcap");
         let bytes = mcap_file::session(run).map_err(|e| ReportError::recording(&path, e))?;
-        write_file(&path, &bytes)?;
+        write_file(&mut written, &path, &bytes)?;
     }
 
     let page = html::page(
@@ -89,7 +96,8 @@ pub fn write_all(dir: &Path, run: &Run) -> Result<(), ReportError> {
             pictures,
         },
     );
-    write_file(&dir.join("report.html"), page.as_bytes())
+    write_file(&mut written, &dir.join("report.html"), page.as_bytes())?;
+    Ok(written)
 }
 
 /// Name of a frame's files without their ending: its number, then its label in plain letters.
@@ -107,7 +115,11 @@ pub fn frame_stem(idx: usize, frame: &Frame) -> String {
 }
 
 /// Draws every frame twice, by displacement and by stress, on scales common to the run.
-fn write_pictures(dir: &Path, run: &Run) -> Result<Vec<html::Picture>, ReportError> {
+fn write_pictures(
+    written: &mut Vec<PathBuf>,
+    dir: &Path,
+    run: &Run,
+) -> Result<Vec<html::Picture>, ReportError> {
     let scene = render::Scene::of(run);
     let mut pictures = Vec::new();
     for (idx, frame) in run.frames.iter().enumerate() {
@@ -117,7 +129,7 @@ fn write_pictures(dir: &Path, run: &Run) -> Result<Vec<html::Picture>, ReportErr
             let png = scene
                 .png(&run.part, frame, quantity)
                 .map_err(|cause| ReportError::picture(&path, cause))?;
-            write_file(&path, &png)?;
+            write_file(written, &path, &png)?;
             pictures.push(html::Picture {
                 frame: idx,
                 quantity,
@@ -133,11 +145,13 @@ fn write_pictures(dir: &Path, run: &Run) -> Result<Vec<html::Picture>, ReportErr
     Ok(pictures)
 }
 
-fn write_file(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
+fn write_file(written: &mut Vec<PathBuf>, path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
     std::fs::write(path, bytes).map_err(|source| ReportError::Io {
         path: path.to_path_buf(),
         source,
-    })
+    })?;
+    written.push(path.to_path_buf());
+    Ok(())
 }
 
 /// Refuses indices and lengths that would end in a panic further down.
@@ -195,7 +209,7 @@ mod tests {
     fn the_folder_is_complete() {
         let dir = tempfile::tempdir().unwrap();
         let run = sample::run();
-        write_all(dir.path(), &run).unwrap();
+        let mut written = write_all(dir.path(), &run).unwrap();
         let mut files: Vec<String> = Vec::new();
         for folder in [dir.path().to_path_buf(), dir.path().join("frames")] {
             for entry in std::fs::read_dir(folder).unwrap() {
@@ -207,6 +221,10 @@ mod tests {
             }
         }
         files.sort();
+        written.sort_by_key(|path| path.file_name().map(ToOwned::to_owned));
+        assert!(written.iter().all(|path| path.is_file()));
+        let names = written.iter().map(|path| path.file_name().unwrap());
+        assert!(names.eq(files.iter().map(std::ffi::OsStr::new)));
         assert_eq!(
             files,
             [
@@ -246,6 +264,38 @@ mod tests {
         run.frames[0].displacement[0].x = f64::NAN;
         run.frames[1].von_mises[2] = f64::INFINITY;
         write_all(dir.path(), &run).unwrap();
+    }
+
+    #[test]
+    fn the_same_run_gives_the_same_bytes() {
+        let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+        let [first, second] = folders
+            .each_ref()
+            .map(|dir| write_all(dir.path(), &sample::run()).unwrap());
+        assert_eq!(first.len(), second.len());
+        for (a, b) in first.iter().zip(&second) {
+            assert_eq!(a.file_name(), b.file_name());
+            assert!(
+                std::fs::read(a).unwrap() == std::fs::read(b).unwrap(),
+                "{}",
+                a.display()
+            );
+        }
+    }
+
+    /// A device that is always full stands in for a full disk.
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn a_full_disk_is_an_error_that_names_the_file() {
+        for name in ["force-travel.csv", "session.mcap", "report.html"] {
+            let dir = tempfile::tempdir().unwrap();
+            std::os::unix::fs::symlink("/dev/full", dir.path().join(name)).unwrap();
+            let error = write_all(dir.path(), &sample::run())
+                .unwrap_err()
+                .to_string();
+            assert!(error.contains(name), "{error}");
+            assert!(error.contains("No space left"), "{error}");
+        }
     }
 
     #[test]

@@ -11,7 +11,7 @@ use super::curve::Curve;
 use super::data::{Effect, Handbook, PaperStage, Run};
 use super::plot::short;
 use super::render::Quantity;
-use super::summary::{Percentiles, max_certificate, stage_percentiles};
+use super::summary::{Percentiles, max_certificate, max_wrench_mismatch, stage_percentiles};
 
 /// Plots and pictures that go into the page.
 #[derive(Clone, Debug, Default)]
@@ -142,7 +142,8 @@ it is, the crisper the snap.</li>\
 the peak and stretches the drop, as a soft grip does.</li>\
 <li><b>Certificate</b> is the largest violation of the contact conditions in any step: no contact \
 pulls, no node is inside the tool, no force without touch; scaled so that 1 is as large as the \
-forces and gaps themselves.</li>\
+forces and gaps themselves. <b>Imbalance</b> is by how much the force of the contacts on the tool \
+differs from that of the coupling, as a share of it.</li>\
 <li><b>Strain</b> tells whether the material stays elastic: compare with its permissible strain. \
 <b>Rotation</b> tells whether small displacements are a fair assumption: see the effect \
 <i>large_rotation</i>.</li>\
@@ -329,6 +330,10 @@ fn key_numbers(page: &mut String, run: &Run, curve: &Curve) {
             format!("{:.1e}", max_certificate(&run.rows)),
         ),
         (
+            "worst imbalance of contact and coupling",
+            format!("{:.1e}", max_wrench_mismatch(&run.rows)),
+        ),
+        (
             "preparation",
             format!("{} s{source}", short(facts.prepare_s)),
         ),
@@ -404,7 +409,7 @@ fn timing(page: &mut String, run: &Run, svg: &str) {
             page,
             &["stage", "2004 (ms)", "here (µs)", "factor"],
             &paper_rows(&run.paper),
-            &[],
+            &[run.paper.len()],
             false,
         );
     }
@@ -415,9 +420,17 @@ fn timing(page: &mut String, run: &Run, svg: &str) {
     );
 }
 
+/// The stages, and their sum where all of them were timed.
 fn paper_rows(paper: &[PaperStage]) -> Vec<Vec<String>> {
+    let sum = PaperStage {
+        stage: "together".into(),
+        paper_ms: paper.iter().map(|row| row.paper_ms).sum(),
+        ours_us: paper.iter().map(|row| row.ours_us).sum(),
+    };
+    let is_whole = paper.iter().all(|row| row.ours_us > 0.0);
     paper
         .iter()
+        .chain(is_whole.then_some(&sum))
         .map(|row| {
             let factor = row.paper_ms * 1e3 / row.ours_us;
             let factor = if factor.is_finite() {
@@ -504,6 +517,8 @@ mod tests {
             "insertion force (N)",
             "-4.8 %",
             "2004 (ms)",
+            "<tr class=\"sum\"><td>together</td><td class=\"n\">2.71</td><td class=\"n\">61.1</td>",
+            "<dt>worst imbalance of contact and coupling</dt><dd>1.0e-12</dd>",
             "p99.9",
             "symmetry of the compliance",
             "not estimated",

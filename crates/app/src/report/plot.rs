@@ -62,10 +62,11 @@ pub fn force_travel(run: &Run, curve: &Curve) -> Result<String, Box<dyn Error>> 
     let room = 0.08 * (y1 - y0);
 
     let dashes = handbook.len() > 1;
+    // The formula after the colon stands beside the table, not in the legend.
     let book = run
         .handbook
         .as_ref()
-        .map(|h| h.name.as_str())
+        .and_then(|h| h.name.split(": ").next())
         .unwrap_or_default();
     let mut keys = vec![Key::new("pushing in", BLUE, 3)];
     if !retraction.is_empty() {
@@ -122,7 +123,11 @@ pub fn force_travel(run: &Run, curve: &Curve) -> Result<String, Box<dyn Error>> 
                 12 * FINE
             };
             let shift = (aside, -8 * FINE - height as i32);
+            let end = (shift.0 + width as i32, shift.1 + height as i32);
+            // The words stay readable where a curve runs below them.
+            let backdrop = WHITE.mix(0.85).filled();
             chart.draw_series([EmptyElement::at(peak)
+                + Rectangle::new([shift, end], backdrop)
                 + Circle::new((0, 0), 6 * FINE, INK.filled())
                 + Circle::new((0, 0), 4 * FINE, ORANGE.filled())
                 + Text::new(text, shift, style)])?;
@@ -288,6 +293,9 @@ fn draw(
     Ok(svg.replacen(&at_fine, &shown, 1))
 }
 
+/// Letters of a legend's entry that fit beside the others.
+const LEGEND_LENGTH: usize = 70;
+
 fn legend(head: &Area<'_>, keys: &[Key]) -> Result<(), Box<dyn Error>> {
     let (mut x, y) = (84 * FINE, 20 * FINE);
     for key in keys {
@@ -302,7 +310,10 @@ fn legend(head: &Area<'_>, keys: &[Key]) -> Result<(), Box<dyn Error>> {
             line(0, 25)?;
         }
         let style = words(17, INK);
-        let label: String = key.label.chars().take(70).collect();
+        let mut label: String = key.label.chars().take(LEGEND_LENGTH).collect();
+        if label.len() < key.label.len() {
+            label.push('…');
+        }
         let (width, height) = head.estimate_text_size(&label, &style)?;
         let place = (x + 33 * FINE, y - height as i32 / 2);
         head.draw(&Text::new(label, place, style))?;
@@ -382,6 +393,18 @@ mod tests {
         }
         assert!(svg.starts_with("<svg"));
         assert!(!svg.contains("NaN"));
+    }
+
+    #[test]
+    fn the_legend_names_the_formula_without_writing_it_out() {
+        let mut run = sample::run();
+        let book = run.handbook.as_mut().unwrap();
+        book.name = "cantilever: P = b h² E ε / 6 L".into();
+        let svg = force_travel(&run, &Curve::of(&run.rows)).unwrap();
+        assert!(svg.contains("handbook: cantilever\n"));
+        run.handbook.as_mut().unwrap().name = "long ".repeat(40);
+        let svg = force_travel(&run, &Curve::of(&run.rows)).unwrap();
+        assert!(svg.contains("long …\n"));
     }
 
     #[test]

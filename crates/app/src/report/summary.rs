@@ -120,7 +120,7 @@ pub fn json(run: &Run, curve: &Curve) -> String {
         max_principal_strain: facts.max_principal_strain,
         max_rotation_deg: facts.max_rotation_deg,
         max_certificate: max_certificate(&run.rows),
-        max_wrench_mismatch_rel: largest(run.rows.iter().map(|row| row.wrench_mismatch_rel)),
+        max_wrench_mismatch_rel: max_wrench_mismatch(&run.rows),
         nodes: facts.nodes,
         elements: facts.elements,
         order: facts.order,
@@ -157,6 +157,12 @@ pub fn json(run: &Run, curve: &Curve) -> String {
     let mut text = serde_json::to_string_pretty(&summary).unwrap_or_default();
     text.push('\n');
     text
+}
+
+/// Worst imbalance of contact and coupling wrench on the tool of all steps, relative; not a number
+/// if any step's is not.
+pub fn max_wrench_mismatch(rows: &[StepRow]) -> f64 {
+    largest(rows.iter().map(|row| row.wrench_mismatch_rel))
 }
 
 /// Worst certificate of all steps; not a number if any step's is not.

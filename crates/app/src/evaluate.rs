@@ -450,17 +450,20 @@ impl Story<'_> {
         ];
         if let ToolShape::Cylinder { radius, .. } = self.scene.tool.shape {
             // A rounded edge leaves the ramp for its corner before the arm is fully bent: there the
-            // bottom of the edge is still r (1 - cos a) above the height of its contact.
+            // bottom of the edge is still r (1 - cos a) above the height of its contact. The bent
+            // arm has turned the ramp by its slope at the end, 3 y / (2 L).
             let alpha = hook.lead_angle_deg.to_radians();
             let bent = hook.undercut - radius * (1.0 - alpha.cos());
             if bent > 0.0 {
-                let force = frictionless.mating_force(young_modulus) * bent / hook.undercut;
+                let across = frictionless.deflection_force(young_modulus) * bent / hook.undercut;
+                let force = across * (alpha + 1.5 * bent / hook.length).tan();
                 compared.push(row("mating force of a rounded edge", force, peak, "N"));
             }
         }
         Some(Handbook {
             name: "cantilever snap hook without friction: P = (b h²/6) E ε/L, ε = 1.5 h y/L², \
-                   W = P tan α; a rounded edge of radius r leaves the ramp at y - r (1 - cos α)"
+                   W = P tan α; a rounded edge of radius r leaves the ramp at y - r (1 - cos α), with the ramp \
+                   turned by the arm's slope 3 y/(2 L)"
                 .to_owned(),
             rows: compared,
             curve: frictionless

@@ -231,3 +231,32 @@ fn wrong_arguments_are_usage_errors() {
         assert!(!outcome.err.is_empty());
     }
 }
+
+#[test]
+fn a_part_that_is_not_held_is_refused_with_the_free_motion() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = scene_with(dir.path(), |text| {
+        text.lines()
+            .filter(|l| !l.trim_start().starts_with("fixed"))
+            .map(|l| format!("{l}\n"))
+            .collect()
+    });
+    let outcome = run(&scene);
+    assert_eq!(outcome.code, 2, "{}", outcome.err);
+    assert!(
+        outcome.err.contains("fixed") && outcome.err.contains("clip.toml:"),
+        "{}",
+        outcome.err
+    );
+
+    let dir = tempfile::tempdir().unwrap();
+    let held_along_x = "[{ group = \"fixed\", components = [\"x\"] }]";
+    let scene = scene_with(dir.path(), |text| set(text, "fixed", held_along_x));
+    let outcome = run(&scene);
+    assert_eq!(outcome.code, 2, "{}", outcome.err);
+    assert!(
+        outcome.err.contains("shift along y") && outcome.err.contains("fixed"),
+        "{}",
+        outcome.err
+    );
+}

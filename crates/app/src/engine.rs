@@ -26,7 +26,7 @@ use glamx::DPose3;
 pub use part::ContactPart;
 pub use report::{ActiveContact, N_STAGES, Stage, StepReport};
 use scratch::Scratch;
-use watch_list::WatchList;
+use watch_list::{State, WatchList};
 
 /// How often the contact planes are drawn anew within one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,7 +64,7 @@ const MAX_PASSES: u32 = 60;
 
 /// Slack of the watch list over the distance at which nodes get a plane: long enough to be kept for
 /// tens of steps of a hand, short enough that few nodes are evaluated in vain.
-const WATCH_SLACK: f64 = 3.0;
+const WATCH_SLACK: f64 = 10.0;
 
 /// Strides in one step; at 1 kHz and a stride of 0.2 mm this follows a hand at 6.4 m/s.
 const MAX_STRIDES: f64 = 32.0;
@@ -228,14 +228,14 @@ impl Engine {
         let part = self.part.as_ref();
 
         // Which candidates can be near: a list that stays valid over many passes and steps.
-        let candidates = self.watch_list.update(
+        let state = State {
             part,
-            &self.tool,
+            tool: &self.tool,
             tool_pose,
             active,
-            was_active,
-            self.settings.near_distance,
-        );
+            is_active: was_active,
+        };
+        let candidates = self.watch_list.update(state, self.settings.near_distance);
         clock.lap(Stage::Proximity, report);
 
         // One plane per near node, at its displaced position (paper, Fig. 3).
@@ -261,15 +261,8 @@ impl Engine {
         );
         clock.lap(Stage::Planes, report);
 
-        // W and q: compliance of part and coupling seen along the contact normals; q is the gap
-        // that remains at zero contact force.
+        // q: the gap that remains at zero contact force.
         let m = planes.len();
-        let coupling = self
-            .coupling_compliance
-            .as_ref()
-            .map(|matrix| CouplingCompliance { matrix, reference });
-        let assembled = delassus_into(part, planes, coupling, &mut w_matrix[..m * m]);
-        debug_assert!(assembled.is_ok(), "the matrix has the size of the planes");
         for ((q, plane), u) in q.iter_mut().zip(planes.iter()).zip(u_before.iter()) {
             let along: f64 = plane
                 .tool_row(reference)
@@ -279,9 +272,25 @@ impl Engine {
                 .sum();
             *q = plane.gap - plane.normal.dot(*u) + along;
         }
+        // W: compliance of part and coupling seen along the contact normals. Not needed where all
+        // gaps are open without force: then z = 0 is the exact answer.
+        let is_open = q[..m].iter().all(|q| *q >= 0.0);
+        if !is_open {
+            let coupling = self
+                .coupling_compliance
+                .as_ref()
+                .map(|matrix| CouplingCompliance { matrix, reference });
+            let assembled = delassus_into(part, planes, coupling, &mut w_matrix[..m * m]);
+            debug_assert!(assembled.is_ok(), "the matrix has the size of the planes");
+        }
         clock.lap(Stage::Delassus, report);
 
-        self.scratch.solve(m, &self.settings.lcp, report);
+        if is_open {
+            self.scratch.z[..m].fill(0.0);
+            (report.certificate, report.lcp_solved) = (0.0, true);
+        } else {
+            self.scratch.solve(m, &self.settings.lcp, report);
+        }
         clock.lap(Stage::Lcp, report);
 
         // Forces of the near nodes become the state; the tool goes where its coupling balances.

@@ -1,4 +1,4 @@
-//! Candidates that are worth evaluating, kept over many steps.
+//! Candidates that are worth evaluating, kept over many passes and steps.
 //!
 //! A list made at one state of tool and forces holds every candidate whose displaced distance to
 //! the tool was below `reach + slack`. It misses none that is nearer than `reach` as long as
@@ -7,7 +7,9 @@
 //! |motion of the tool's surface near the part| + Σ_j max_i ‖C_ij‖ |f_j - f_j,then| <= slack
 //! ```
 //! because a signed distance changes by no more than the point and the surface move. Both terms
-//! are bounds, not estimates; the second costs one norm per contact.
+//! are bounds, not estimates; the second costs one norm per contact. Two lists are nested: a wide
+//! one, made from the tree of all candidates every few tens of steps, and a narrow one, made from
+//! the wide one every few steps; only the narrow one is evaluated in each pass.
 
 use contact::proximity::NodeTree;
 use contact::tool::Tool;
@@ -16,12 +18,70 @@ use glamx::DPose3;
 
 use super::{ActiveContact, ContactPart};
 
+/// Slack of the narrow list over that of the wide one.
+const NARROW_SHARE: f64 = 0.2;
+
 #[derive(Debug)]
 pub(super) struct WatchList {
     tree: NodeTree,
+    found: Vec<u32>,
+    wide: List,
+    narrow: List,
+}
+
+/// What a list is judged by: the state of now.
+#[derive(Clone, Copy)]
+pub(super) struct State<'a> {
+    pub(super) part: &'a ContactPart,
+    pub(super) tool: &'a Tool,
+    pub(super) tool_pose: &'a DPose3,
+    pub(super) active: &'a [ActiveContact],
+    /// By candidate: carries force.
+    pub(super) is_active: &'a [bool],
+}
+
+impl WatchList {
+    /// `slack` (m): how far tool and part may move before the wide list is made anew.
+    ///
+    /// # Errors
+    /// Rest positions that are not finite.
+    pub(super) fn new(part: &ContactPart, slack: f64) -> Result<Self, contact::Error> {
+        Ok(Self {
+            tree: NodeTree::new(part.rest_positions())?,
+            found: Vec::with_capacity(part.n_candidates()),
+            wide: List::new(part, slack),
+            narrow: List::new(part, NARROW_SHARE * slack),
+        })
+    }
+
+    /// Makes the next [`Self::update`] look anew.
+    pub(super) fn forget(&mut self) {
+        self.wide.pose = None;
+        self.narrow.pose = None;
+    }
+
+    /// The candidates that may be nearer than `reach` (m) to the tool. Does not allocate.
+    pub(super) fn update(&mut self, state: State<'_>, reach: f64) -> &[u32] {
+        if self.narrow.is_stale(state) {
+            // The narrow list is made from the wide one, which must reach as far as it looks.
+            let narrow_reach = reach + self.narrow.slack;
+            if self.wide.is_stale(state) {
+                let wide_reach = narrow_reach + self.wide.slack;
+                let inflate = wide_reach + state.part.displacement_bound(state.active);
+                self.tree
+                    .near_into(state.tool, state.tool_pose, inflate, &mut self.found);
+                self.wide.make(state, &self.found, wide_reach);
+            }
+            self.narrow.make(state, &self.wide.watched, narrow_reach);
+        }
+        &self.narrow.watched
+    }
+}
+
+#[derive(Debug)]
+struct List {
     /// Candidate indices, ascending.
     watched: Vec<u32>,
-    near: Vec<u32>,
     pose: Option<DPose3>,
     /// By candidate: force when the list was made, N.
     force_then: Vec<DVec3>,
@@ -31,66 +91,35 @@ pub(super) struct WatchList {
     radius: f64,
 }
 
-impl WatchList {
-    /// `slack` (m): how far tool and part may move before the list is made anew.
-    ///
-    /// # Errors
-    /// Rest positions that are not finite.
-    pub(super) fn new(part: &ContactPart, slack: f64) -> Result<Self, contact::Error> {
-        let n = part.n_candidates();
-        let centre = part.rest_positions().iter().sum::<DVec3>() / n.max(1) as f64;
-        let radius = part
-            .rest_positions()
-            .iter()
-            .map(|x| (*x - centre).length())
-            .fold(0.0, f64::max);
-        Ok(Self {
-            tree: NodeTree::new(part.rest_positions())?,
-            watched: Vec::with_capacity(n),
-            near: Vec::with_capacity(n),
+impl List {
+    fn new(part: &ContactPart, slack: f64) -> Self {
+        let rest = part.rest_positions();
+        let centre = rest.iter().sum::<DVec3>() / rest.len().max(1) as f64;
+        Self {
+            watched: Vec::with_capacity(rest.len()),
             pose: None,
-            force_then: vec![DVec3::ZERO; n],
-            active_then: Vec::with_capacity(n),
+            force_then: vec![DVec3::ZERO; rest.len()],
+            active_then: Vec::with_capacity(rest.len()),
             slack,
             centre,
-            radius,
-        })
-    }
-
-    /// Makes the next [`Self::update`] look anew.
-    pub(super) fn forget(&mut self) {
-        self.pose = None;
-    }
-
-    /// The candidates that may be nearer than `reach` (m) to the tool. `is_active` tells whether a
-    /// candidate carries force now. Does not allocate.
-    pub(super) fn update(
-        &mut self,
-        part: &ContactPart,
-        tool: &Tool,
-        tool_pose: &DPose3,
-        active: &[ActiveContact],
-        is_active: &[bool],
-        reach: f64,
-    ) -> &[u32] {
-        let moved = self.pose.map_or(f64::INFINITY, |then| {
-            self.motion_bound(&then, tool_pose, part, active)
-                + self.change_bound(part, active, is_active)
-        });
-        if moved > self.slack {
-            self.make(part, tool, tool_pose, active, reach + self.slack);
+            radius: rest
+                .iter()
+                .map(|x| (*x - centre).length())
+                .fold(0.0, f64::max),
         }
-        &self.watched
+    }
+
+    /// Whether tool and part may have moved by more than the slack.
+    fn is_stale(&self, state: State<'_>) -> bool {
+        let Some(then) = self.pose else { return true };
+        let moved = self.motion_bound(&then, state) + self.change_bound(state);
+        // A state that is not finite is looked at anew.
+        moved.is_nan() || moved > self.slack
     }
 
     /// Bound on how far any point of the tool that is near the part has moved, m.
-    fn motion_bound(
-        &self,
-        then: &DPose3,
-        now: &DPose3,
-        part: &ContactPart,
-        active: &[ActiveContact],
-    ) -> f64 {
+    fn motion_bound(&self, then: &DPose3, state: State<'_>) -> f64 {
+        let now = state.tool_pose;
         let shift = (now.translation - then.translation).length();
         let turn = now.rotation.angle_between(then.rotation);
         if turn == 0.0 {
@@ -98,54 +127,40 @@ impl WatchList {
         }
         let lever = (now.translation - self.centre).length()
             + self.radius
-            + part.displacement_bound(active)
+            + state.part.displacement_bound(state.active)
             + self.slack;
         shift + turn * lever
     }
 
     /// Bound on the change of any candidate's displacement since the list was made, m.
-    fn change_bound(
-        &self,
-        part: &ContactPart,
-        active: &[ActiveContact],
-        is_active: &[bool],
-    ) -> f64 {
-        let changed: f64 = active
+    fn change_bound(&self, state: State<'_>) -> f64 {
+        let changed: f64 = state
+            .active
             .iter()
             .map(|c| {
                 let then = self.force_then[c.candidate as usize];
-                part.largest_block(c.candidate) * (c.force_on_part - then).length()
+                state.part.largest_block(c.candidate) * (c.force_on_part - then).length()
             })
             .sum();
         let gone: f64 = self
             .active_then
             .iter()
-            .filter(|c| !is_active[**c as usize])
-            .map(|c| part.largest_block(*c) * self.force_then[*c as usize].length())
+            .filter(|c| !state.is_active[**c as usize])
+            .map(|c| state.part.largest_block(*c) * self.force_then[*c as usize].length())
             .sum();
         changed + gone
     }
 
-    fn make(
-        &mut self,
-        part: &ContactPart,
-        tool: &Tool,
-        tool_pose: &DPose3,
-        active: &[ActiveContact],
-        reach: f64,
-    ) {
-        self.tree.near_into(
-            tool,
-            tool_pose,
-            reach + part.displacement_bound(active),
-            &mut self.near,
-        );
+    /// Keeps those of `from` that are nearer than `reach` now.
+    fn make(&mut self, state: State<'_>, from: &[u32], reach: f64) {
         self.watched.clear();
-        for &candidate in &self.near {
+        for &candidate in from {
             let i = candidate as usize;
-            let position = part.rest_positions()[i] + part.displacement(i, active);
+            let position =
+                state.part.rest_positions()[i] + state.part.displacement(i, state.active);
             // A position that is not finite stays on the list, to be counted where planes are made.
-            let is_far = tool.signed_distance(tool_pose, position).signed_distance > reach;
+            let distance = state.tool.signed_distance(state.tool_pose, position);
+            let is_far = distance.signed_distance > reach;
             if !is_far {
                 self.watched.push(candidate);
             }
@@ -153,10 +168,84 @@ impl WatchList {
         for candidate in self.active_then.drain(..) {
             self.force_then[candidate as usize] = DVec3::ZERO;
         }
-        for contact in active {
+        for contact in state.active {
             self.force_then[contact.candidate as usize] = contact.force_on_part;
             self.active_then.push(contact.candidate);
         }
-        self.pose = Some(*tool_pose);
+        self.pose = Some(*state.tool_pose);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use contact::tool::Sphere;
+
+    use super::*;
+
+    /// Nodes on a grid, each on its own spring of 1000 N/m; a sphere and forces wander at random.
+    #[test]
+    fn no_near_candidate_is_ever_missed() {
+        let side = 12usize;
+        let rest: Vec<DVec3> = (0..side * side)
+            .map(|k| 1e-3 * DVec3::new((k % side) as f64, (k / side) as f64, 0.0))
+            .collect();
+        let n = rest.len();
+        let mut blocks = vec![0.0; 9 * n * n];
+        for j in 0..n {
+            for c in 0..3 {
+                blocks[9 * (j * n + j) + 4 * c] = 1e-3;
+            }
+        }
+        let part = ContactPart::new(rest, n, blocks);
+        let tool = Tool::Sphere(Sphere::new(3e-3).unwrap());
+        let (reach, slack) = (2e-4, 2e-3);
+        let mut list = WatchList::new(&part, slack).unwrap();
+        let mut seed = 0x1234_5678_u64;
+        let mut random = move || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (seed >> 33) as f64 / f64::from(1u32 << 31) - 0.5
+        };
+        let mut pose = DPose3::from_translation(DVec3::new(5e-3, 5e-3, 2.5e-3));
+        let mut near_seen = 0;
+        for _ in 0..3000 {
+            pose.translation += 4e-4 * DVec3::new(random(), random(), 0.2 * random());
+            pose.translation = pose
+                .translation
+                .clamp(DVec3::new(0.0, 0.0, 1e-3), DVec3::splat(11e-3));
+            let mut is_active = vec![false; n];
+            let mut active = Vec::new();
+            for candidate in 0..n as u32 {
+                if random() > 0.45 {
+                    is_active[candidate as usize] = true;
+                    let force_on_part = DVec3::new(0.1 * random(), 0.1 * random(), random());
+                    let normal_force = force_on_part.length();
+                    active.push(ActiveContact {
+                        candidate,
+                        normal_force,
+                        force_on_part,
+                    });
+                }
+            }
+            let state = State {
+                part: &part,
+                tool: &tool,
+                tool_pose: &pose,
+                active: &active,
+                is_active: &is_active,
+            };
+            let watched = list.update(state, reach).to_vec();
+            for candidate in 0..n {
+                let position =
+                    part.rest_positions()[candidate] + part.displacement(candidate, &active);
+                if tool.signed_distance(&pose, position).signed_distance < reach {
+                    near_seen += 1;
+                    assert!(
+                        watched.contains(&(candidate as u32)),
+                        "{candidate} at {position}"
+                    );
+                }
+            }
+        }
+        assert!(near_seen > 1000, "the walk met {near_seen} near nodes only");
     }
 }

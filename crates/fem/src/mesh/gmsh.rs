@@ -38,7 +38,7 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Mesh, Error> {
     let mut seen_format = false;
     while let Some(section) = reader.section()? {
         if !seen_format && section != "MeshFormat" {
-            return Err(reader.wrong("is no Gmsh mesh: it does not begin with $MeshFormat"));
+            return Err(reader.wrong_line("is no Gmsh mesh: it does not begin with $MeshFormat"));
         }
         match section.as_str() {
             "MeshFormat" => {
@@ -166,7 +166,7 @@ impl File {
             let dimension = parts.next().and_then(|s| s.parse().ok());
             let tag = parts.next().and_then(|s| s.parse().ok());
             let (Some(dimension), Some(tag), Some(name)) = (dimension, tag, parts.next()) else {
-                return Err(reader.wrong("a physical name needs dimension, tag and \"name\""));
+                return Err(reader.wrong_line("a physical name needs dimension, tag and \"name\""));
             };
             self.names
                 .insert((dimension, tag), name.trim().trim_matches('"').to_owned());

@@ -36,6 +36,16 @@ impl<'a> Reader<'a> {
         }
     }
 
+    /// An error in the line that [`Self::text_line`] has just passed.
+    pub(super) fn wrong_line(&self, what: &str) -> Error {
+        let before = self.at.saturating_sub(1);
+        Self {
+            at: before,
+            ..*self
+        }
+        .wrong(what)
+    }
+
     fn cut_short(&self) -> Error {
         self.wrong("the file ends too early; it was not written or copied completely")
     }
@@ -49,7 +59,9 @@ impl<'a> Reader<'a> {
         let line = self.text_line()?;
         match line.trim().strip_prefix('$') {
             Some(name) if !name.is_empty() && name.len() < 100 => Ok(Some(name.to_owned())),
-            _ => Err(self.wrong("is no Gmsh mesh here: a section such as $Nodes was expected")),
+            _ => {
+                Err(self.wrong_line("is no Gmsh mesh here: a section such as $Nodes was expected"))
+            }
         }
     }
 
@@ -63,7 +75,7 @@ impl<'a> Reader<'a> {
         if line.trim() == format!("$End{section}") {
             return Ok(());
         }
-        Err(self.wrong(&format!("$End{section} was expected")))
+        Err(self.wrong_line(&format!("$End{section} was expected")))
     }
 
     /// Passes over a section that is not used.

@@ -17,7 +17,7 @@ use std::time::Instant;
 
 use contact::delassus::{CouplingCompliance, delassus_into};
 use contact::lcp;
-use contact::plane::{planes_into, wrench_on_tool};
+use contact::plane::{Plane, planes_into, wrench_on_tool};
 use contact::tool::Tool;
 use device::VirtualCoupling;
 use glam::DVec3;
@@ -189,6 +189,7 @@ impl Engine {
             ContactIterations::Converged => (MAX_PASSES, self.settings.displacement_tolerance),
             ContactIterations::Fixed(n) => (n.max(1), 0.0),
         };
+        self.scratch.begin_stride();
         report.passes = 0;
         report.converged = false;
         let mut tool_pose = VirtualCoupling::pose_from_deviation(target, &self.deviation);
@@ -216,42 +217,51 @@ impl Engine {
     fn pass(&mut self, tool_pose: &mut DPose3, target: &DPose3, report: &mut StepReport) -> f64 {
         let mut clock = StageClock::start();
         let reference = tool_pose.translation;
+        let part = self.part.as_ref();
+        let tool = &self.tool;
+        let pose = *tool_pose;
+        let near_distance = self.settings.near_distance;
+        let planes_of = |candidates: &[u32],
+                         active: &[ActiveContact],
+                         max_gap: f64,
+                         planes: &mut Vec<Plane>| {
+            let position_of = |candidate: u32| {
+                let i = candidate as usize;
+                part.rest_positions()[i] + part.displacement(i, active)
+            };
+            planes_into(tool, &pose, candidates, position_of, max_gap, planes)
+        };
+
+        // Which candidates can be near: a list that stays valid over many passes and steps.
+        let Scratch {
+            planes,
+            active,
+            was_active,
+            ..
+        } = &mut self.scratch;
+        let state = State {
+            part,
+            tool,
+            tool_pose,
+            active,
+            is_active: was_active,
+        };
+        let candidates = self.watch_list.update(state, near_distance);
+        clock.lap(Stage::Proximity, report);
+
+        // One plane per near node, at its displaced position (paper, Fig. 3).
+        let left_out = planes_of(candidates, active, near_distance, planes);
+        report.dropped = (left_out.n_beyond_capacity + left_out.n_invalid) as u32;
+        self.scratch.keep_seen(|missing, active, extra| {
+            planes_of(missing, active, f64::INFINITY, extra);
+        });
         let Scratch {
             planes,
             u_before,
             w_matrix,
             q,
-            active,
-            was_active,
             ..
         } = &mut self.scratch;
-        let part = self.part.as_ref();
-
-        // Which candidates can be near: a list that stays valid over many passes and steps.
-        let state = State {
-            part,
-            tool: &self.tool,
-            tool_pose,
-            active,
-            is_active: was_active,
-        };
-        let candidates = self.watch_list.update(state, self.settings.near_distance);
-        clock.lap(Stage::Proximity, report);
-
-        // One plane per near node, at its displaced position (paper, Fig. 3).
-        let position_of = |candidate: u32| {
-            let i = candidate as usize;
-            part.rest_positions()[i] + part.displacement(i, active)
-        };
-        let left_out = planes_into(
-            &self.tool,
-            tool_pose,
-            candidates,
-            position_of,
-            self.settings.near_distance,
-            planes,
-        );
-        report.dropped = (left_out.n_beyond_capacity + left_out.n_invalid) as u32;
         report.near = planes.len() as u32;
         u_before.clear();
         u_before.extend(

@@ -10,6 +10,16 @@ use super::{ActiveContact, StepReport};
 pub(super) struct Scratch {
     /// Planes of this pass; its capacity is the largest number of rows.
     pub(super) planes: Vec<Plane>,
+    /// Planes of nodes that had one earlier in the step and are farther away now.
+    extra: Vec<Plane>,
+    /// Candidates that had a plane in this step: each keeps it to the step's end.
+    seen: Vec<u32>,
+    missing: Vec<u32>,
+    /// By candidate: number of the pass in which it last had a plane, and of the step.
+    pass_of: Vec<u64>,
+    stride_of: Vec<u64>,
+    pass: u64,
+    stride: u64,
     /// Displacement of the planes' nodes before the pass, m.
     pub(super) u_before: Vec<DVec3>,
     pub(super) w_matrix: Vec<f64>,
@@ -30,6 +40,13 @@ impl Scratch {
         // Planes are made up to their capacity, which may be more than was asked for.
         let rows = planes.capacity();
         Self {
+            extra: Vec::with_capacity(rows),
+            seen: Vec::with_capacity(n_candidates),
+            missing: Vec::with_capacity(n_candidates),
+            pass_of: vec![0; n_candidates],
+            stride_of: vec![0; n_candidates],
+            pass: 0,
+            stride: 0,
             u_before: Vec::with_capacity(rows),
             w_matrix: vec![0.0; rows * rows],
             q: vec![0.0; rows],
@@ -46,6 +63,49 @@ impl Scratch {
     pub(super) fn clear_contacts(&mut self) {
         self.active.clear();
         self.was_active.fill(false);
+    }
+
+    /// Begins a search for equilibrium: only nodes that carry force have had a plane.
+    pub(super) fn begin_stride(&mut self) {
+        self.stride += 1;
+        self.seen.clear();
+        for contact in &self.active {
+            self.stride_of[contact.candidate as usize] = self.stride;
+            self.seen.push(contact.candidate);
+        }
+    }
+
+    /// Adds planes for nodes that had one earlier in this stride and were not `near` enough for one
+    /// now. Without them two sets of nodes can take turns: each lifts off while the other is pressed,
+    /// loses its plane, and sinks in again. With them the set only grows, and passes end.
+    ///
+    /// `plane_of` makes planes, whatever the gap, for the candidates it is given, displaced by the
+    /// contacts it is given.
+    pub(super) fn keep_seen(
+        &mut self,
+        plane_of: impl FnOnce(&[u32], &[ActiveContact], &mut Vec<Plane>),
+    ) {
+        self.pass += 1;
+        for plane in &self.planes {
+            self.pass_of[plane.candidate as usize] = self.pass;
+        }
+        let (pass, pass_of) = (self.pass, &self.pass_of);
+        self.missing.clear();
+        let unplaned = self.seen.iter().copied();
+        self.missing
+            .extend(unplaned.filter(|c| pass_of[*c as usize] != pass));
+        if !self.missing.is_empty() {
+            plane_of(&self.missing, &self.active, &mut self.extra);
+            let room = self.planes.capacity() - self.planes.len();
+            self.planes.extend(self.extra.drain(..).take(room));
+        }
+        for plane in &self.planes {
+            let stride_of = &mut self.stride_of[plane.candidate as usize];
+            if *stride_of != self.stride {
+                *stride_of = self.stride;
+                self.seen.push(plane.candidate);
+            }
+        }
     }
 
     /// Solves `w = q + W z` for the `m` planes, warm-started from the nodes that carried force.

@@ -102,3 +102,55 @@ pub fn duration(seconds: f64) -> String {
         s => format!("{:.0} min", s / 60.0),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::prepare::{GroupRef, PartSpec, load};
+    use fem::{Material, Quadrature};
+
+    fn clip() -> LoadedPart {
+        let group = |name: &str| GroupRef {
+            name: name.to_owned(),
+            place: "clip.toml:1".to_owned(),
+        };
+        load(&PartSpec {
+            mesh_path: std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+                .join("../../scenes/clip.msh"),
+            length_scale: 1.0,
+            order: Some(2),
+            material: Material::new(2.7e9, 0.35).unwrap(),
+            fixed: vec![(group("fixed"), [true; 3])],
+            contact: vec![group("contact")],
+            quadrature: Quadrature::Converged,
+        })
+        .unwrap()
+    }
+
+    #[test]
+    fn what_cannot_fit_is_refused_with_what_to_change() {
+        let part = clip();
+        let forecast = Forecast::of(&part);
+        let pairs = (part.candidates.len() * part.rows.len()) as f64;
+        assert_eq!(forecast.compliance_bytes, 72.0 * pairs);
+        let needed = forecast.compliance_bytes + forecast.factor_bytes;
+        assert!(forecast.refuse_beyond(&part, needed).is_ok());
+        let refusal = forecast
+            .refuse_beyond(&part, 0.5 * needed)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            refusal.contains("clip.msh") && refusal.contains("part.contact"),
+            "{refusal}"
+        );
+    }
+
+    #[test]
+    fn sizes_and_times_are_readable() {
+        assert_eq!(bytes(999.0), "999 B");
+        assert_eq!(bytes(1.5e9), "1.5 GB");
+        assert_eq!(duration(0.0204), "20 ms");
+        assert_eq!(duration(66.94), "66.9 s");
+        assert_eq!(duration(600.0), "10 min");
+    }
+}

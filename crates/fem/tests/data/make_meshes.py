@@ -1,11 +1,11 @@
-"""Makes the meshes of this folder: python make_meshes.py (pip install gmsh==4.15.2)."""
+"""Makes the meshes of this folder but for the cantilevers: python make_meshes.py (gmsh 4.15.2)."""
+
+import math
 
 import gmsh
 
 gmsh.initialize()
-gmsh.option.setNumber("General.Verbosity", 2)
-gmsh.option.setNumber("Mesh.ElementOrder", 1)
-gmsh.option.setNumber("Mesh.RandomSeed", 1)
+gmsh.option.setNumber("General.Terminal", 0)
 
 
 def save(name, version=4.1, binary=0, parametric=0):
@@ -15,50 +15,47 @@ def save(name, version=4.1, binary=0, parametric=0):
     gmsh.write(name)
 
 
-def group(dimension, entities, name):
-    gmsh.model.addPhysicalGroup(dimension, entities, name=name)
-
-
-def faces_at(axis, value):
-    box = [-9.0] * 3 + [9.0] * 3
-    box[axis], box[axis + 3] = value - 1e-6, value + 1e-6
+def faces_at_x(value):
+    box = [value - 1e-6, -9, -9, value + 1e-6, 9, 9]
     return [tag for _, tag in gmsh.model.getEntitiesInBoundingBox(*box, 2)]
 
 
-# A box 2 x 1 x 1, unstructured; "fixed" and "load" are part of "surface".
+def mesh_with_groups(first, size):
+    """Part of the surface is also a group of its own."""
+    surface = [tag for _, tag in gmsh.model.getEntities(2)]
+    body = [tag for _, tag in gmsh.model.getEntities(3)]
+    gmsh.model.addPhysicalGroup(2, faces_at_x(0.0), 1, first)
+    gmsh.model.addPhysicalGroup(2, surface, 2, "surface")
+    gmsh.model.addPhysicalGroup(3, body, 3, "body")
+    gmsh.option.setNumber("Mesh.MeshSizeMin", size)
+    gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+    gmsh.model.mesh.generate(3)
+
+
+# A box 2 x 1 x 1.
+gmsh.model.add("box")
 gmsh.model.occ.addBox(0, 0, 0, 2, 1, 1)
 gmsh.model.occ.synchronize()
-group(2, faces_at(0, 0.0), "fixed")
-group(2, faces_at(0, 2.0), "load")
-group(2, [tag for _, tag in gmsh.model.getEntities(2)], "surface")
-group(3, [1], "body")
-gmsh.option.setNumber("Mesh.MeshSizeMin", 0.8)
-gmsh.option.setNumber("Mesh.MeshSizeMax", 0.8)
-gmsh.model.mesh.generate(3)
+mesh_with_groups("left side", 1.2)
 for order in (1, 2, 3):
     gmsh.model.mesh.setOrder(order)
-    save(f"box-tet{(0, 4, 10, 20)[order]}.msh")
-    save(f"box-tet{(0, 4, 10, 20)[order]}-binary.msh", binary=1)
+    save(f"box-order{order}-ascii.msh")
+    save(f"box-order{order}-binary.msh", binary=1)
 gmsh.model.mesh.setOrder(1)
-save("box-parametric.msh", parametric=1)
+save("box-version2.2.msh", version=2.2)
+save("box-version2.2-binary.msh", version=2.2, binary=1)
+save("box-version4.0.msh", version=4.0)
+save("box-parametric-ascii.msh", parametric=1)
 save("box-parametric-binary.msh", binary=1, parametric=1)
-save("box-version-2.2.msh", version=2.2)
-save("box-version-2.2-binary.msh", version=2.2, binary=1)
-save("box-version-4.0.msh", version=4.0)
 
 # A quarter of a ring, radii 1 and 2, height 1; the round sides are curved.
-gmsh.clear()
-outer = gmsh.model.occ.addCylinder(0, 0, 0, 0, 0, 1, 2, angle=1.5707963267948966)
-inner = gmsh.model.occ.addCylinder(0, 0, 0, 0, 0, 1, 1, angle=1.5707963267948966)
+gmsh.model.add("ring")
+outer = gmsh.model.occ.addCylinder(0, 0, 0, 0, 0, 1, 2, angle=math.pi / 2)
+inner = gmsh.model.occ.addCylinder(0, 0, 0, 0, 0, 1, 1, angle=math.pi / 2)
 gmsh.model.occ.cut([(3, outer)], [(3, inner)])
 gmsh.model.occ.synchronize()
-group(2, faces_at(0, 0.0), "fixed")
-group(2, [tag for _, tag in gmsh.model.getEntities(2)], "surface")
-group(3, [tag for _, tag in gmsh.model.getEntities(3)], "body")
-gmsh.option.setNumber("Mesh.MeshSizeMin", 1.0)
-gmsh.option.setNumber("Mesh.MeshSizeMax", 1.0)
-gmsh.model.mesh.generate(3)
+mesh_with_groups("fixed", 1.0)
 for order in (2, 3):
     gmsh.model.mesh.setOrder(order)
-    save(f"ring-tet{(0, 4, 10, 20)[order]}.msh")
+    save(f"ring-tet{(10, 20)[order - 2]}.msh")
 gmsh.finalize()

@@ -1,0 +1,155 @@
+//! Meshes made by formula, and the shortest way to a solution.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use fem::{Group, Material, Mesh, Order, Quadrature, Stiffness, Supports};
+
+pub(crate) const ORDERS: [Order; 3] = [Order::Linear, Order::Quadratic, Order::Cubic];
+
+pub(crate) fn data(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/data")
+        .join(name)
+}
+
+pub(crate) fn read(name: &str) -> Mesh {
+    fem::mesh::gmsh::read(&data(name)).unwrap()
+}
+
+/// The unit cube in `n`³ cells of six tetrahedra, inner vertices displaced by up to a tenth of a
+/// cell, straight edges; then every node is moved by `map`, which bends the edges if it is not
+/// affine. Groups `fixed` (x = 0), `load` (x = 1) and `surface`.
+pub(crate) fn cube(order: Order, n: usize, map: impl Fn([f64; 3]) -> [f64; 3]) -> Mesh {
+    const PATHS: [[usize; 3]; 6] = [
+        [0, 1, 2],
+        [1, 2, 0],
+        [2, 0, 1],
+        [0, 2, 1],
+        [2, 1, 0],
+        [1, 0, 2],
+    ];
+    let vertex = |at: [usize; 3]| -> [f64; 3] {
+        let is_inner = at.iter().all(|i| *i > 0 && *i < n);
+        std::array::from_fn(|c| {
+            let spread = (at[0] * 7 + at[1] * 13 + at[2] * 29 + c * 5) % 11;
+            let shift = if is_inner { spread as f64 / 50.0 - 0.1 } else { 0.0 };
+            (at[c] as f64 + shift) / n as f64
+        })
+    };
+    let mut nodes = Vec::new();
+    let mut elements = Vec::new();
+    let mut known: HashMap<[i64; 3], u32> = HashMap::new();
+    for cell in 0..n * n * n {
+        let corner = [cell % n, cell / n % n, cell / n / n];
+        for (k, path) in PATHS.iter().enumerate() {
+            let mut at = corner;
+            let mut vertices = [vertex(at); 4];
+            for (step, &axis) in path.iter().enumerate() {
+                at[axis] += 1;
+                vertices[step + 1] = vertex(at);
+            }
+            // Odd permutations of the axes turn the element inside out.
+            if k >= 3 {
+                vertices.swap(1, 2);
+            }
+            for l in order.node_coordinates() {
+                let x: [f64; 3] =
+                    std::array::from_fn(|c| (0..4).map(|v| l[v] * vertices[v][c]).sum());
+                let index = *known.entry(x.map(|c| (c * 1e7).round() as i64)).or_insert_with(|| {
+                    nodes.push(x);
+                    nodes.len() as u32 - 1
+                });
+                elements.push(index);
+            }
+        }
+    }
+    let n_elements = elements.len() / order.nodes_per_element();
+    let tags = (1..=nodes.len() as u64).collect();
+    let straight = Mesh::new(
+        order,
+        nodes,
+        tags,
+        elements,
+        (1..=n_elements as u64).collect(),
+        vec![],
+    );
+    let group = |name: &str, holds: &dyn Fn([f64; 3]) -> bool| {
+        let mut faces = straight.boundary_faces();
+        faces.retain(|f| f.nodes.iter().all(|&i| holds(straight.nodes[i as usize])));
+        let mut nodes: Vec<u32> = faces.iter().flat_map(|f| f.nodes.clone()).collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        Group {
+            name: name.to_owned(),
+            dimension: 2,
+            nodes,
+            faces,
+            elements: vec![],
+        }
+    };
+    let groups = vec![
+        group("fixed", &|x| x[0].abs() < 1e-9),
+        group("load", &|x| (x[0] - 1.0).abs() < 1e-9),
+        group("surface", &|_| true),
+    ];
+    let mut mesh = straight.clone();
+    mesh.groups = groups;
+    for x in &mut mesh.nodes {
+        *x = map(*x);
+    }
+    mesh
+}
+
+/// Bends a cube so that most edges are curved and all elements stay valid.
+pub(crate) fn bend([x, y, z]: [f64; 3]) -> [f64; 3] {
+    [
+        x + 0.10 * y * z,
+        y - 0.12 * x * z + 0.05 * x * x,
+        z + 0.08 * x * y,
+    ]
+}
+
+pub(crate) fn steel() -> Material {
+    Material::new(2.1e11, 0.29).unwrap()
+}
+
+pub(crate) fn assemble(mesh: &Mesh, material: Material, quadrature: Quadrature) -> Stiffness {
+    fem::assemble_stiffness(mesh, &[material], &vec![0; mesh.n_elements()], quadrature).unwrap()
+}
+
+/// Holds all components of the nodes.
+pub(crate) fn hold(mesh: &Mesh, nodes: &[u32]) -> Supports {
+    let mut supports = Supports::new(mesh.n_nodes());
+    for &node in nodes {
+        supports.fix_node(node, [true; 3]);
+    }
+    supports
+}
+
+/// A field at all nodes.
+pub(crate) fn interpolate(mesh: &Mesh, field: impl Fn([f64; 3]) -> [f64; 3]) -> Vec<f64> {
+    mesh.nodes.iter().flat_map(|x| field(*x)).collect()
+}
+
+pub(crate) fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |a: f64, v| a.max(v.abs()))
+}
+
+pub(crate) fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()))
+}
+
+/// Where a local point of an element is.
+pub(crate) fn place(mesh: &Mesh, element: usize, l: [f64; 4]) -> [f64; 3] {
+    let (mut n, mut d) = ([0.0; 20], [[0.0; 4]; 20]);
+    mesh.order.shape(l, &mut n, &mut d);
+    std::array::from_fn(|c| {
+        mesh.element_nodes(element)
+            .iter()
+            .zip(&n)
+            .map(|(&node, n)| n * mesh.nodes[node as usize][c])
+            .sum()
+    })
+}

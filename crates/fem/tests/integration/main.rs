@@ -1,0 +1,11 @@
+//! The crate from outside: files of other programs, exact fields, relations that must hold.
+
+#![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
+
+mod common;
+mod patch;
+mod quality;
+mod reader;
+mod reference;
+mod relations;
+mod stress;

@@ -11,13 +11,13 @@ ro = ri + t;
 b = 10.0 * mm;               // width along z
 half = 54.0 * Pi / 180;      // half opening, from +y
 lip = 1.0 * mm;              // radius of the rounded lip: half the wall
-foot = 5.5 * mm;             // half width of the foot
+foot = 5.0 * mm;             // half width of the foot
 bottom = 14.1 * mm;          // underside of the foot below the tube's axis
 
-// Sizes chosen for about 690 nodes and 295 elements; halve all three for a finer clip.
+// Sizes chosen for 686 nodes, the number of the paper, and 301 elements; halve all three for a finer clip.
 h = 5.7 * mm;                // size of elements along the arms
-hl = 5.0 * mm;               // at the lips
-hf = 7.5 * mm;               // in the foot
+hl = 4.8 * mm;               // at the lips
+hf = 5.5 * mm;               // in the foot
 
 Point(1) = {0, 0, 0, h};   // centre of the arcs
 s = Sin(half); c = Cos(half);
@@ -88,7 +88,7 @@ Physical Surface("contact", 4) = {arms[{11, 12}], lips[]};
 Mesh.ElementOrder = 2;
 Mesh.SecondOrderLinear = 0;  // mid nodes on the arcs
 Mesh.MeshSizeExtendFromBoundary = 1;
-Mesh.Algorithm = 6;          // frontal-Delaunay
+Mesh.Algorithm = 1;          // MeshAdapt: its nodes make the smoothest curve of force here
 Mesh.Algorithm3D = 1;        // Delaunay
 Mesh.Optimize = 1;
 Mesh.MshFileVersion = 4.1;

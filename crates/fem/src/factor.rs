@@ -2,6 +2,7 @@
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{LltError, LltRegularization};
+use faer::prelude::ReborrowMut;
 use faer::sparse::linalg::cholesky::{
     LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
 };
@@ -16,7 +17,7 @@ use crate::supports::Supports;
 /// Degree of freedom that is held.
 const HELD: u32 = u32::MAX;
 
-/// K_ff = L Lᵀ for the free degrees of freedom f.
+/// s K_ff = L Lᵀ for the free degrees of freedom f; s is a power of two.
 #[derive(Debug)]
 pub struct FactoredStiffness {
     symbolic: SymbolicCholesky<u32>,
@@ -24,6 +25,9 @@ pub struct FactoredStiffness {
     /// Place of each degree of freedom among the free ones, or [`HELD`].
     free_of_dof: Vec<u32>,
     dof_of_free: Vec<u32>,
+    /// s: brings the largest diagonal entry between 1 and 2. The square roots of L then have the
+    /// same bits in any system of units that differs by powers of two.
+    scale: f64,
 }
 
 impl FactoredStiffness {
@@ -46,12 +50,14 @@ impl FactoredStiffness {
                 dof_of_free.push(dof as u32);
             }
         }
-        let lower = lower_triangle(stiffness, &free_of_dof, &dof_of_free);
+        let scale = power_of_two_scale(stiffness, &dof_of_free);
+        let lower = lower_triangle(stiffness, &free_of_dof, &dof_of_free, scale);
 
         progress.advance("order the unknowns", 0, 1);
         let symbolic = factorize_symbolic_cholesky(
             lower.symbolic(),
             Side::Lower,
+            // Nested dissection by position gave 12 to 70 % more entries on clips: they are thin.
             SymmetricOrdering::Amd,
             Default::default(),
         )
@@ -89,6 +95,7 @@ impl FactoredStiffness {
             values,
             free_of_dof,
             dof_of_free,
+            scale,
         })
     }
 
@@ -114,7 +121,10 @@ impl FactoredStiffness {
     }
 
     /// Solves for several right-hand sides in place, one column each, in free degrees of freedom.
-    pub(crate) fn solve_in_place(&self, rhs: MatMut<'_, f64>, memory: &mut MemBuffer) {
+    pub(crate) fn solve_in_place(&self, mut rhs: MatMut<'_, f64>, memory: &mut MemBuffer) {
+        for column in rhs.rb_mut().col_iter_mut() {
+            column.iter_mut().for_each(|f| *f *= self.scale);
+        }
         LltRef::<u32, f64>::new(&self.symbolic, &self.values).solve_in_place_with_conj(
             Conj::No,
             rhs,
@@ -172,10 +182,28 @@ impl FactoredStiffness {
     }
 }
 
+/// Power of two that brings the largest diagonal entry of the free part between 1 and 2.
+fn power_of_two_scale(stiffness: &Stiffness, dof_of_free: &[u32]) -> f64 {
+    let diagonal = dof_of_free.iter().flat_map(|&dof| {
+        stiffness
+            .column(dof as usize)
+            .filter(move |(i, _)| *i == dof as usize)
+            .map(|(_, v)| v)
+    });
+    let largest = diagonal.fold(0.0, f64::max);
+    if largest.is_normal() {
+        // The exponent's bits alone are the power of two below.
+        1.0 / f64::from_bits(largest.to_bits() & (0x7ff << 52))
+    } else {
+        1.0
+    }
+}
+
 fn lower_triangle(
     stiffness: &Stiffness,
     free_of_dof: &[u32],
     dof_of_free: &[u32],
+    scale: f64,
 ) -> SparseColMat<u32, f64> {
     let n = dof_of_free.len();
     let mut starts = vec![0u32];
@@ -185,7 +213,7 @@ fn lower_triangle(
             let free = free_of_dof[i];
             if free != HELD && free as usize >= j {
                 rows.push(free);
-                values.push(v);
+                values.push(scale * v);
             }
         }
         starts.push(rows.len() as u32);

@@ -10,7 +10,9 @@ pub enum Quadrature {
     /// (the 4-point rule of C3D10).
     Fast,
     /// A rule that is converged on moderately curved elements: degree 8 for order 2, degree 12
-    /// for order 3. The next rule changes the stiffness of a curved clip by less than 1e-6.
+    /// for order 3. At order 2 two degrees more change the stiffness by 2e-7 of its largest entry
+    /// on a curved clip of 5000 nodes, but by 3e-4 on one of 700 nodes, whose elements follow more
+    /// of the arc each: use `Degree(20)` there if the rule must not show.
     Converged,
     /// A rule that integrates polynomials up to this degree exactly.
     Degree(u32),

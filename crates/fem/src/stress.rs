@@ -94,6 +94,7 @@ fn local_coordinates(mesh: &Mesh, element: usize, point: [f64; 3]) -> Option<[f6
     let n = mesh.order.nodes_per_element();
     let x = mesh.element_coordinates(element);
     let mut l = [0.25; 4];
+    let mut change = f64::INFINITY;
     for _ in 0..30 {
         let (mut values, mut d) = ([0.0; MAX_NODES], [[0.0; 4]; MAX_NODES]);
         mesh.order.shape(l, &mut values, &mut d);
@@ -114,11 +115,13 @@ fn local_coordinates(mesh: &Mesh, element: usize, point: [f64; 3]) -> Option<[f6
         if !l.iter().all(|v| v.abs() < 10.0) {
             return None;
         }
-        if step.iter().all(|s| s.abs() < 1e-13) {
+        change = step.iter().fold(0.0, |a, s| s.abs().max(a));
+        if change < 1e-13 {
             return Some(l);
         }
     }
-    None
+    // Far from the origin round-off of the coordinates keeps the last steps above 1e-13.
+    (change < 1e-9).then_some(l)
 }
 
 /// Stress at a point of the body, Pa.

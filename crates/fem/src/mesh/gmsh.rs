@@ -186,8 +186,9 @@ impl File {
                     reader.float()?;
                 }
                 let n = reader.count(4)?;
+                // Gmsh makes the tag negative where a group reverses the entity.
                 let physical = (0..n)
-                    .map(|_| reader.int())
+                    .map(|_| reader.int().map(i32::saturating_abs))
                     .collect::<Result<Vec<_>, _>>()?;
                 self.physical.insert((dimension, tag), physical);
                 if dimension > 0 {

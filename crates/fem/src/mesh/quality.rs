@@ -19,7 +19,12 @@ impl Mesh {
         Ok(self.warnings())
     }
 
-    /// Smallest bound of det J of an element, m³ (6 times the volume for straight elements).
+    /// How small det J gets in an element, m³ (6 times the volume for straight elements); not
+    /// finite if it overflows.
+    ///
+    /// Order 1: the value. Order 2: a lower bound, so that a positive answer proves the element
+    /// valid. Order 3: the smallest of samples at the nodes and 125 points inside; a fold that is
+    /// narrower than their distance is not seen.
     pub fn smallest_jacobian(&self, element: usize) -> f64 {
         let x = self.element_coordinates(element);
         match self.order {
@@ -36,7 +41,7 @@ impl Mesh {
                         .map(|p| p.coordinates),
                 )
                 .map(|l| det_at(self.order, &x, l))
-                .fold(f64::INFINITY, f64::min),
+                .fold(f64::INFINITY, smaller),
         }
     }
 
@@ -45,7 +50,7 @@ impl Mesh {
         let mut count = 0;
         for e in 0..self.n_elements() {
             let smallest = self.smallest_jacobian(e);
-            if smallest > 0.0 {
+            if smallest > 0.0 && smallest.is_finite() {
                 continue;
             }
             count += 1;
@@ -109,13 +114,21 @@ impl Mesh {
             .filter(|(_, used)| !**used)
             .map(|(tag, _)| *tag)
             .collect();
-        match unused[..] {
-            [] => Vec::new(),
-            [first, ..] => vec![format!(
+        let mut warnings = Vec::new();
+        if let [first, ..] = unused[..] {
+            warnings.push(format!(
                 "{} nodes are in no element (the first is node {first}); they are held and take no part",
                 unused.len()
-            )],
+            ));
         }
+        if let Some((element, count)) = self.overlap() {
+            warnings.push(format!(
+                "{count} faces belong to more than two elements (the first is of element {}); \
+                 elements overlap or are there twice, and their stiffness counts twice",
+                self.element_tags[element as usize]
+            ));
+        }
+        warnings
     }
 }
 
@@ -123,6 +136,11 @@ fn det_at(order: Order, x: &[[f64; 3]; MAX_NODES], l: [f64; 4]) -> f64 {
     let (mut n, mut d) = ([0.0; MAX_NODES], [[0.0; 4]; MAX_NODES]);
     order.shape(l, &mut n, &mut d);
     determinant(&jacobian(&d[..order.nodes_per_element()], x))
+}
+
+/// The smaller one; not a number if either is not, so that overflow does not pass as valid.
+fn smaller(a: f64, b: f64) -> f64 {
+    if a < b || a.is_nan() { a } else { b }
 }
 
 /// Smallest Bernstein coefficient of det J of a tet10, a cubic: positive coefficients prove a
@@ -156,7 +174,7 @@ fn bernstein_in(x: &[[f64; 3]; MAX_NODES], corners: &[[f64; 4]; 4], depth: u32) 
         l
     };
     let vertex: [f64; 4] = std::array::from_fn(|v| at(unit(v)));
-    let mut lowest = vertex.iter().copied().fold(f64::INFINITY, f64::min);
+    let mut lowest = vertex.iter().copied().fold(f64::INFINITY, smaller);
     // On an edge: values at 0, 1/3, 2/3, 1 of a cubic give its inner coefficients.
     let mut edge = [[0.0; 4]; 4];
     for a in 0..4 {
@@ -175,7 +193,7 @@ fn bernstein_in(x: &[[f64; 3]; MAX_NODES], corners: &[[f64; 4]; 4], depth: u32) 
                 coefficient[a][b] = (-5.0 * vertex[a] + 18.0 * edge[a][b] - 9.0 * edge[b][a]
                     + 2.0 * vertex[b])
                     / 6.0;
-                lowest = lowest.min(coefficient[a][b]);
+                lowest = smaller(lowest, coefficient[a][b]);
             }
         }
     }
@@ -192,16 +210,16 @@ fn bernstein_in(x: &[[f64; 3]; MAX_NODES], corners: &[[f64; 4]; 4], depth: u32) 
                 }
             }
         }
-        lowest = lowest.min(sum / 6.0);
+        lowest = smaller(lowest, sum / 6.0);
     }
-    let sampled = vertex.iter().chain(edge.iter().flatten()).copied();
-    if lowest > 0.0 || depth == 0 || sampled.filter(|v| *v != 0.0).any(|v| v < 0.0) {
+    let is_negative_somewhere = vertex.iter().chain(edge.iter().flatten()).any(|v| *v < 0.0);
+    if lowest > 0.0 || lowest.is_nan() || depth == 0 || is_negative_somewhere {
         return lowest;
     }
     divide(corners)
         .iter()
         .map(|part| bernstein_in(x, part, depth - 1))
-        .fold(f64::INFINITY, f64::min)
+        .fold(f64::INFINITY, smaller)
 }
 
 /// Eight parts by the mid points of the edges.

@@ -5,23 +5,21 @@ use std::collections::HashMap;
 use super::{Face, Mesh};
 use crate::element::FACE_VERTICES;
 
+/// The first element that has a face, which of its faces it is, and how many elements have it.
+struct FaceOwners {
+    element: u32,
+    face: u8,
+    count: u32,
+}
+
 impl Mesh {
     /// Faces that belong to one element only, with normals out of the body.
     pub fn boundary_faces(&self) -> Vec<Face> {
-        let mut owners: HashMap<[u32; 3], (u32, u8, u8)> =
-            HashMap::with_capacity(2 * self.n_elements());
-        for e in 0..self.n_elements() {
-            let nodes = self.element_nodes(e);
-            for (f, vertices) in FACE_VERTICES.iter().enumerate() {
-                let mut key = vertices.map(|v| nodes[v]);
-                key.sort_unstable();
-                owners.entry(key).or_insert((e as u32, f as u8, 0)).2 += 1;
-            }
-        }
-        let mut boundary: Vec<(u32, u8)> = owners
+        let mut boundary: Vec<(u32, u8)> = self
+            .face_owners()
             .into_values()
-            .filter(|o| o.2 == 1)
-            .map(|o| (o.0, o.1))
+            .filter(|o| o.count == 1)
+            .map(|o| (o.element, o.face))
             .collect();
         boundary.sort_unstable();
         let local: Vec<Vec<usize>> = (0..4).map(|f| self.order.face_nodes(f)).collect();
@@ -34,6 +32,33 @@ impl Mesh {
                 }
             })
             .collect()
+    }
+
+    /// First element with a face that more than two elements have, and how many such faces.
+    pub(super) fn overlap(&self) -> Option<(u32, usize)> {
+        let owners = self.face_owners();
+        let overlapping = owners.values().filter(|o| o.count > 2);
+        let first = overlapping.clone().map(|o| o.element).min()?;
+        Some((first, overlapping.count()))
+    }
+
+    /// Owners of every face, by its vertices, ascending.
+    fn face_owners(&self) -> HashMap<[u32; 3], FaceOwners> {
+        let mut owners = HashMap::with_capacity(2 * self.n_elements());
+        for e in 0..self.n_elements() {
+            let nodes = self.element_nodes(e);
+            for (f, vertices) in FACE_VERTICES.iter().enumerate() {
+                let mut key = vertices.map(|v| nodes[v]);
+                key.sort_unstable();
+                let first = FaceOwners {
+                    element: e as u32,
+                    face: f as u8,
+                    count: 0,
+                };
+                owners.entry(key).or_insert(first).count += 1;
+            }
+        }
+        owners
     }
 
     /// Nodes of the boundary faces, ascending.

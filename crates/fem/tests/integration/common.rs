@@ -33,7 +33,11 @@ pub(crate) fn cube(order: Order, n: usize, map: impl Fn([f64; 3]) -> [f64; 3]) -
         let is_inner = at.iter().all(|i| *i > 0 && *i < n);
         std::array::from_fn(|c| {
             let spread = (at[0] * 7 + at[1] * 13 + at[2] * 29 + c * 5) % 11;
-            let shift = if is_inner { spread as f64 / 50.0 - 0.1 } else { 0.0 };
+            let shift = if is_inner {
+                spread as f64 / 50.0 - 0.1
+            } else {
+                0.0
+            };
             (at[c] as f64 + shift) / n as f64
         })
     };
@@ -56,10 +60,12 @@ pub(crate) fn cube(order: Order, n: usize, map: impl Fn([f64; 3]) -> [f64; 3]) -
             for l in order.node_coordinates() {
                 let x: [f64; 3] =
                     std::array::from_fn(|c| (0..4).map(|v| l[v] * vertices[v][c]).sum());
-                let index = *known.entry(x.map(|c| (c * 1e7).round() as i64)).or_insert_with(|| {
-                    nodes.push(x);
-                    nodes.len() as u32 - 1
-                });
+                let index = *known
+                    .entry(x.map(|c| (c * 1e7).round() as i64))
+                    .or_insert_with(|| {
+                        nodes.push(x);
+                        nodes.len() as u32 - 1
+                    });
                 elements.push(index);
             }
         }
@@ -138,7 +144,9 @@ pub(crate) fn largest(values: &[f64]) -> f64 {
 
 pub(crate) fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
-    a.iter().zip(b).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()))
+    a.iter()
+        .zip(b)
+        .fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()))
 }
 
 /// Where a local point of an element is.

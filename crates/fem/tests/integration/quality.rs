@@ -6,9 +6,20 @@ use crate::common::{ORDERS, bend, cube, hold, place, read};
 
 /// One element on the unit tetrahedron, tag 7.
 fn single(order: Order) -> Mesh {
-    let nodes: Vec<[f64; 3]> = order.node_coordinates().iter().map(|l| [l[1], l[2], l[3]]).collect();
+    let nodes: Vec<[f64; 3]> = order
+        .node_coordinates()
+        .iter()
+        .map(|l| [l[1], l[2], l[3]])
+        .collect();
     let n = nodes.len() as u64;
-    Mesh::new(order, nodes, (1..=n).collect(), (0..n as u32).collect(), vec![7], vec![])
+    Mesh::new(
+        order,
+        nodes,
+        (1..=n).collect(),
+        (0..n as u32).collect(),
+        vec![7],
+        vec![],
+    )
 }
 
 fn check(mesh: &Mesh) -> Result<Vec<String>, Error> {
@@ -62,15 +73,18 @@ fn inverted_elements_are_named_by_their_tag() {
             .collect();
         mesh.elements[11 * n..12 * n].copy_from_slice(&mirrored);
         let error = check(&mesh).unwrap_err();
-        assert!(matches!(error, Error::Inverted { tag: 4711, .. }), "{error}");
+        assert!(
+            matches!(error, Error::Inverted { tag: 4711, .. }),
+            "{error}"
+        );
     }
     let mut flat = single(Order::Linear);
     flat.nodes[3] = [0.3, 0.3, 0.0];
     assert!(matches!(check(&flat), Err(Error::Inverted { tag: 7, .. })));
 }
 
-/// The mid nodes of a face pulled in: det J is positive at all ten nodes and at the vertices,
-/// negative inside. Only a bound of the polynomial finds it.
+/// All mid nodes pulled towards the centre until det J is negative somewhere, while it is still
+/// positive at the vertices. Only a bound of the polynomial finds it.
 #[test]
 fn a_fold_between_the_nodes_is_found() {
     let mut mesh = single(Order::Quadratic);
@@ -98,7 +112,10 @@ fn a_fold_between_the_nodes_is_found() {
             break lowest;
         }
     };
-    assert!((0..4).all(|v| determinant(&mesh, 0, nodes[v]) > 0.0), "{fold}");
+    assert!(
+        (0..4).all(|v| determinant(&mesh, 0, nodes[v]) > 0.0),
+        "{fold}"
+    );
     assert!(matches!(check(&mesh), Err(Error::Inverted { tag: 7, .. })));
 }
 
@@ -141,10 +158,24 @@ fn a_loose_piece_is_named_with_its_size_and_motion() {
     elements.extend(one.elements.iter().map(|i| i + n));
     let count = 2 * one.n_elements() as u64;
     let tags = (1..=nodes.len() as u64).collect();
-    let mesh = Mesh::new(Order::Quadratic, nodes, tags, elements, (101..101 + count).collect(), vec![]);
+    let mesh = Mesh::new(
+        Order::Quadratic,
+        nodes,
+        tags,
+        elements,
+        (101..101 + count).collect(),
+        vec![],
+    );
     assert_eq!(mesh.pieces(), [[0; 6], [1; 6]].concat());
-    let error = mesh.check(&hold(&mesh, &one.group("fixed").unwrap().nodes)).unwrap_err();
-    let Error::LoosePiece { tag, elements, motions } = &error else {
+    let error = mesh
+        .check(&hold(&mesh, &one.group("fixed").unwrap().nodes))
+        .unwrap_err();
+    let Error::LoosePiece {
+        tag,
+        elements,
+        motions,
+    } = &error
+    else {
         panic!("{error}");
     };
     assert_eq!((*tag, *elements), (107, 6));
@@ -167,7 +198,12 @@ fn free_motions_are_named() {
         }
     };
     assert_eq!(motions(&|_| [true, true, false]), "shift along z");
-    assert_eq!(motions(&|x| [x[0] == 0.0 && x[1] == 0.0; 3]).matches("turn about z").count(), 1);
+    assert_eq!(
+        motions(&|x| [x[0] == 0.0 && x[1] == 0.0; 3])
+            .matches("turn about z")
+            .count(),
+        1
+    );
     assert_eq!(motions(&|x| [x[2] == 0.0; 3]), "");
     let rollers = motions(&|x| [x[0] == 0.0, x[1] == 0.0, false]);
     assert_eq!(rollers, "shift along z");
@@ -180,15 +216,45 @@ fn a_node_of_no_element_warns_and_is_held() {
     nodes.insert(0, [9.0; 3]);
     let elements = one.elements.iter().map(|n| n + 1).collect();
     let tags = (500..500 + nodes.len() as u64).collect();
-    let mesh = Mesh::new(Order::Linear, nodes, tags, elements, one.element_tags.clone(), vec![]);
-    let base: Vec<u32> = one.group("fixed").unwrap().nodes.iter().map(|n| n + 1).collect();
+    let mesh = Mesh::new(
+        Order::Linear,
+        nodes,
+        tags,
+        elements,
+        one.element_tags.clone(),
+        vec![],
+    );
+    let base: Vec<u32> = one
+        .group("fixed")
+        .unwrap()
+        .nodes
+        .iter()
+        .map(|n| n + 1)
+        .collect();
     let supports = hold(&mesh, &base);
     let warnings = mesh.check(&supports).unwrap();
     assert_eq!(warnings.len(), 1);
-    assert!(warnings[0].contains("1 node") && warnings[0].contains("node 500"), "{warnings:?}");
+    assert!(
+        warnings[0].contains("1 node") && warnings[0].contains("node 500"),
+        "{warnings:?}"
+    );
     let stiffness = crate::common::assemble(&mesh, crate::common::steel(), fem::Quadrature::Fast);
     let factor = fem::FactoredStiffness::new(&stiffness, &supports, &fem::Silent).unwrap();
     assert_eq!(factor.solve(&vec![1.0; factor.n_dofs()])[..3], [0.0; 3]);
+}
+
+#[test]
+fn an_element_that_is_there_twice_warns() {
+    let mut mesh = cube(Order::Quadratic, 2, bend);
+    let inner = mesh.element_nodes(20).to_vec();
+    mesh.elements.extend(inner);
+    mesh.element_tags.push(999);
+    let warnings = check(&mesh).unwrap();
+    assert_eq!(warnings.len(), 1);
+    assert!(
+        warnings[0].contains("more than two elements"),
+        "{warnings:?}"
+    );
 }
 
 /// Divergence theorem: the flux of x through a closed surface with outward normals is 3 V. The
@@ -207,29 +273,48 @@ fn boundary_faces_are_closed_and_point_outward() {
         for face in &faces {
             assert_eq!(face.nodes.len(), mesh.order.nodes_per_face());
             for k in 0..3 {
-                *edges.entry((face.nodes[k], face.nodes[(k + 1) % 3])).or_insert(0) += 1;
+                *edges
+                    .entry((face.nodes[k], face.nodes[(k + 1) % 3]))
+                    .or_insert(0) += 1;
             }
         }
         // Each edge once in each direction: closed, and turned the same way all over.
-        assert!(edges.iter().all(|(&(a, b), &n)| n == 1 && edges.contains_key(&(b, a))));
+        assert!(
+            edges
+                .iter()
+                .all(|(&(a, b), &n)| n == 1 && edges.contains_key(&(b, a)))
+        );
         let flux: f64 = faces
             .iter()
             .map(|face| {
                 // By the vertices alone, which tells the sign of each face.
                 let [a, b, c] = [0, 1, 2].map(|k| mesh.nodes[face.nodes[k] as usize]);
                 let cross = |u: [f64; 3], v: [f64; 3]| -> [f64; 3] {
-                    std::array::from_fn(|i| u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3])
+                    std::array::from_fn(|i| {
+                        u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3]
+                    })
                 };
                 let n = cross(
                     std::array::from_fn(|i| b[i] - a[i]),
                     std::array::from_fn(|i| c[i] - a[i]),
                 );
-                (0..3).map(|i| n[i] * (a[i] + b[i] + c[i]) / 6.0).sum::<f64>()
+                (0..3)
+                    .map(|i| n[i] * (a[i] + b[i] + c[i]) / 6.0)
+                    .sum::<f64>()
             })
             .sum();
         assert!(flux > 0.0);
         let force = fem::load::pressure(&mesh, mesh.group("surface").unwrap(), -1.0).unwrap();
-        let exact: f64 = mesh.nodes.iter().flatten().zip(&force).map(|(x, f)| x * f).sum();
-        assert!((exact / (3.0 * volume) - 1.0).abs() < tolerance, "{exact} {volume}");
+        let exact: f64 = mesh
+            .nodes
+            .iter()
+            .flatten()
+            .zip(&force)
+            .map(|(x, f)| x * f)
+            .sum();
+        assert!(
+            (exact / (3.0 * volume) - 1.0).abs() < tolerance,
+            "{exact} {volume}"
+        );
     }
 }

@@ -130,7 +130,16 @@ fn a_spoiled_compliance_fails_its_check() {
     let n_rows = bad.rows.len();
     bad.blocks[9 * n_rows] += 1e-3 * largest(&good.blocks);
     let error = bad.check(&solved.stiffness, &solved.factor).unwrap_err();
-    assert!(matches!(error, Error::CheckFailed { what: "asymmetry", .. }), "{error}");
+    assert!(
+        matches!(
+            error,
+            Error::CheckFailed {
+                what: "asymmetry",
+                ..
+            }
+        ),
+        "{error}"
+    );
     let mut bad = good;
     bad.blocks.iter_mut().for_each(|v| *v = -*v);
     let error = bad.check(&solved.stiffness, &solved.factor).unwrap_err();
@@ -156,7 +165,10 @@ fn a_prescribed_displacement_gives_the_uniaxial_state() {
             .flat_map(|x| [stretch * x[0], -nu * stretch * x[1], -nu * stretch * x[2]])
             .collect();
         let u = factor.solve_prescribed(&stiffness, &vec![0.0; exact.len()], &exact);
-        assert!(largest_difference(&u, &exact) < 1e-13 * stretch, "order {order}");
+        assert!(
+            largest_difference(&u, &exact) < 1e-13 * stretch,
+            "order {order}"
+        );
         // ½ E ε² V.
         let energy = 0.5 * e * stretch * stretch;
         assert!((stiffness.strain_energy(&u) / energy - 1.0).abs() < 1e-12);
@@ -229,7 +241,10 @@ fn pressure_on_a_closed_surface_sums_to_nothing() {
                 torque[c] += x[a] * f[b] - x[b] * f[a];
             }
         }
-        assert!(largest(&sum) < 1e-13 && largest(&torque) < 1e-12, "{sum:?} {torque:?}");
+        assert!(
+            largest(&sum) < 1e-13 && largest(&torque) < 1e-12,
+            "{sum:?} {torque:?}"
+        );
     }
 }
 
@@ -254,7 +269,11 @@ fn each_element_has_its_own_material() {
     let mesh = cube(Order::Linear, 2, |x| x);
     let mut of_element = vec![0; mesh.n_elements()];
     for (e, material) in of_element.iter_mut().enumerate() {
-        let x: f64 = mesh.element_nodes(e).iter().map(|&n| mesh.nodes[n as usize][0]).sum();
+        let x: f64 = mesh
+            .element_nodes(e)
+            .iter()
+            .map(|&n| mesh.nodes[n as usize][0])
+            .sum();
         *material = u32::from(x > 2.0);
     }
     let materials = [1e6, 1e12].map(|e| Material::new(e, 0.0).unwrap());
@@ -267,7 +286,11 @@ fn each_element_has_its_own_material() {
     let u = factor.solve(&force);
     for &node in &load.nodes {
         // F L / (E A) of the soft half, L = ½ m; its inner face is not plane, so a few per cent.
-        assert!((u[3 * node as usize] / 0.5e-6 - 1.0).abs() < 0.1, "{}", u[3 * node as usize]);
+        assert!(
+            (u[3 * node as usize] / 0.5e-6 - 1.0).abs() < 0.1,
+            "{}",
+            u[3 * node as usize]
+        );
     }
 }
 
@@ -279,7 +302,12 @@ fn a_body_held_everywhere_has_no_compliance() {
     let stiffness = assemble(&mesh, steel(), Quadrature::Fast);
     let factor = FactoredStiffness::new(&stiffness, &supports, &Silent).unwrap();
     assert_eq!(factor.n_free(), 0);
-    assert!(factor.solve(&vec![1.0; factor.n_dofs()]).iter().all(|u| *u == 0.0));
+    assert!(
+        factor
+            .solve(&vec![1.0; factor.n_dofs()])
+            .iter()
+            .all(|u| *u == 0.0)
+    );
     let c = Compliance::build(&factor, &all, &all, &Silent).unwrap();
     assert!(c.blocks.iter().all(|v| *v == 0.0));
     c.check(&stiffness, &factor).unwrap();
@@ -357,7 +385,14 @@ fn a_hinge_is_not_positive_definite_or_fails_its_check() {
         elements.extend(one.elements.iter().map(|&n| second[n as usize]));
         let tags = (1..=nodes.len() as u64).collect();
         let n_elements = 2 * one.n_elements() as u64;
-        let mesh = Mesh::new(order, nodes, tags, elements, (1..=n_elements).collect(), vec![]);
+        let mesh = Mesh::new(
+            order,
+            nodes,
+            tags,
+            elements,
+            (1..=n_elements).collect(),
+            vec![],
+        );
         let supports = hold(&mesh, &one.group("fixed").unwrap().nodes);
         let stiffness = assemble(&mesh, steel(), Quadrature::Fast);
         let refused = FactoredStiffness::new(&stiffness, &supports, &Silent).and_then(|factor| {

@@ -64,7 +64,7 @@ const MAX_PASSES: u32 = 60;
 
 /// Slack of the watch list over the distance at which nodes get a plane: long enough to be kept for
 /// tens of steps of a hand, short enough that few nodes are evaluated in vain.
-const WATCH_SLACK: f64 = 10.0;
+const WATCH_SLACK: f64 = 30.0;
 
 /// Strides in one step; at 1 kHz and a stride of 0.2 mm this follows a hand at 6.4 m/s.
 const MAX_STRIDES: f64 = 32.0;

@@ -1,20 +1,11 @@
 //! Tetrahedra of order 1, 2 and 3: where their nodes are and what their shape functions are.
 //!
-//! ```text
-//! order 2 (tet10)                     edges of the nodes
-//!            3                         4: 01   5: 12   6: 02
-//!           /|\                        7: 03   8: 23   9: 13
-//!          / | \
-//!         7  |  8                     order 3 (tet20)
-//!        /   9   \                     4  5: 01    6  7: 12    8  9: 20   (in that direction)
-//!       /    |    \                   10 11: 30   12 13: 32   14 15: 31
-//!      0-- 6 |-----2                  16: face 012   17: 013   18: 023   19: 123
-//!        \   |   /
-//!         4  |  5
-//!           \|/
-//!            1
-//! ```
-//! The order is Gmsh's; other programs swap nodes 8 and 9 of tet10.
+//! One file for each, with its drawing, node order and functions. The order is Gmsh's; other
+//! programs swap nodes 8 and 9 of tet10.
+
+mod tet10;
+mod tet20;
+mod tet4;
 
 use std::fmt;
 
@@ -32,10 +23,6 @@ pub enum Order {
 
 /// Most nodes that an element has.
 pub const MAX_NODES: usize = 20;
-
-const EDGES_QUADRATIC: [[usize; 2]; 6] = [[0, 1], [1, 2], [0, 2], [0, 3], [2, 3], [1, 3]];
-const EDGES_CUBIC: [[usize; 2]; 6] = [[0, 1], [1, 2], [2, 0], [3, 0], [3, 2], [3, 1]];
-const FACES_CUBIC: [[usize; 3]; 4] = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]];
 
 /// Vertices of the four faces, turned so that the normal points out of the element.
 pub const FACE_VERTICES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
@@ -78,44 +65,18 @@ impl Order {
     pub fn edges(self) -> &'static [[usize; 2]] {
         match self {
             Self::Linear => &[],
-            Self::Quadratic => &EDGES_QUADRATIC,
-            Self::Cubic => &EDGES_CUBIC,
+            Self::Quadratic => &tet10::EDGES,
+            Self::Cubic => &tet20::EDGES,
         }
     }
 
     /// Barycentric coordinates of the nodes.
     pub fn node_coordinates(self) -> Vec<[f64; 4]> {
-        let at = |weights: &[(usize, f64)]| {
-            let mut l = [0.0; 4];
-            for &(vertex, weight) in weights {
-                l[vertex] = weight;
-            }
-            l
-        };
-        let mut nodes: Vec<[f64; 4]> = (0..4).map(|v| at(&[(v, 1.0)])).collect();
         match self {
-            Self::Linear => {}
-            Self::Quadratic => {
-                nodes.extend(
-                    EDGES_QUADRATIC
-                        .iter()
-                        .map(|e| at(&[(e[0], 0.5), (e[1], 0.5)])),
-                );
-            }
-            Self::Cubic => {
-                let (near, far) = (2.0 / 3.0, 1.0 / 3.0);
-                for e in EDGES_CUBIC {
-                    nodes.push(at(&[(e[0], near), (e[1], far)]));
-                    nodes.push(at(&[(e[0], far), (e[1], near)]));
-                }
-                nodes.extend(
-                    FACES_CUBIC
-                        .iter()
-                        .map(|f| at(&[(f[0], far), (f[1], far), (f[2], far)])),
-                );
-            }
+            Self::Linear => vertices(),
+            Self::Quadratic => tet10::nodes(),
+            Self::Cubic => tet20::nodes(),
         }
-        nodes
     }
 
     /// Local nodes of face `face`, in the order of Gmsh's triangle of this order: vertices, then
@@ -129,14 +90,14 @@ impl Order {
                 Self::Linear => {}
                 Self::Quadratic => {
                     nodes.extend(
-                        EDGES_QUADRATIC
+                        tet10::EDGES
                             .iter()
                             .position(|e| *e == [a, b] || *e == [b, a])
                             .map(|e| 4 + e),
                     );
                 }
                 Self::Cubic => {
-                    for (e, edge) in EDGES_CUBIC.iter().enumerate() {
+                    for (e, edge) in tet20::EDGES.iter().enumerate() {
                         if *edge == [a, b] {
                             nodes.extend([4 + 2 * e, 5 + 2 * e]);
                         } else if *edge == [b, a] {
@@ -150,7 +111,7 @@ impl Order {
             let mut sorted = vertices;
             sorted.sort_unstable();
             nodes.extend(
-                FACES_CUBIC
+                tet20::FACES
                     .iter()
                     .position(|f| *f == sorted)
                     .map(|f| 16 + f),
@@ -169,45 +130,9 @@ impl Order {
     ) {
         *derivatives = [[0.0; 4]; MAX_NODES];
         match self {
-            Self::Linear => {
-                for v in 0..4 {
-                    values[v] = l[v];
-                    derivatives[v][v] = 1.0;
-                }
-            }
-            Self::Quadratic => {
-                for v in 0..4 {
-                    values[v] = l[v] * (2.0 * l[v] - 1.0);
-                    derivatives[v][v] = 4.0 * l[v] - 1.0;
-                }
-                for (e, [a, b]) in EDGES_QUADRATIC.into_iter().enumerate() {
-                    values[4 + e] = 4.0 * l[a] * l[b];
-                    derivatives[4 + e][a] = 4.0 * l[b];
-                    derivatives[4 + e][b] = 4.0 * l[a];
-                }
-            }
-            Self::Cubic => {
-                for v in 0..4 {
-                    let x = l[v];
-                    values[v] = 0.5 * x * (3.0 * x - 1.0) * (3.0 * x - 2.0);
-                    derivatives[v][v] = 13.5 * x * x - 9.0 * x + 1.0;
-                }
-                for (e, [a, b]) in EDGES_CUBIC.into_iter().enumerate() {
-                    for (k, (near, far)) in [(a, b), (b, a)].into_iter().enumerate() {
-                        let node = 4 + 2 * e + k;
-                        values[node] = 4.5 * l[near] * l[far] * (3.0 * l[near] - 1.0);
-                        derivatives[node][near] = 4.5 * l[far] * (6.0 * l[near] - 1.0);
-                        derivatives[node][far] = 4.5 * l[near] * (3.0 * l[near] - 1.0);
-                    }
-                }
-                for (f, [a, b, c]) in FACES_CUBIC.into_iter().enumerate() {
-                    let node = 16 + f;
-                    values[node] = 27.0 * l[a] * l[b] * l[c];
-                    derivatives[node][a] = 27.0 * l[b] * l[c];
-                    derivatives[node][b] = 27.0 * l[a] * l[c];
-                    derivatives[node][c] = 27.0 * l[a] * l[b];
-                }
-            }
+            Self::Linear => tet4::shape(l, values, derivatives),
+            Self::Quadratic => tet10::shape(l, values, derivatives),
+            Self::Cubic => tet20::shape(l, values, derivatives),
         }
     }
 }
@@ -216,6 +141,19 @@ impl fmt::Display for Order {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", *self as u8)
     }
+}
+
+fn vertices() -> Vec<[f64; 4]> {
+    (0..4).map(|v| between(&[(v, 1.0)])).collect()
+}
+
+/// The point with these weights of these vertices.
+fn between(weights: &[(usize, f64)]) -> [f64; 4] {
+    let mut l = [0.0; 4];
+    for &(vertex, weight) in weights {
+        l[vertex] = weight;
+    }
+    l
 }
 
 /// Shape functions of the triangle with 3, 6 or 10 nodes and their derivatives by L_1..L_3.

@@ -86,6 +86,9 @@ pub enum Error {
     /// A group has no faces to load.
     #[error("group {0:?} has no faces, so no load can act on it")]
     NoFaces(String),
+    /// The faces of a group have no area, so a total force cannot be spread over them.
+    #[error("the faces of group {0:?} have an area of {1} m²; no force can be spread over them")]
+    NoArea(String, f64),
     /// The factorisation met a pivot that is not positive.
     #[error(
         "the stiffness is not positive definite (pivot {pivot}): the body is not held, or its elements are degenerate"

@@ -8,6 +8,7 @@ use faer::sparse::linalg::cholesky::{
 };
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use faer::{Conj, MatMut, Par, Side};
+use rayon::prelude::*;
 
 use crate::Error;
 use crate::assembly::Stiffness;
@@ -159,6 +160,34 @@ impl FactoredStiffness {
         u
     }
 
+    /// As [`Self::solve`] for several forces, one after the other in `forces`, in parallel.
+    pub fn solve_many(&self, forces: &[f64]) -> Vec<f64> {
+        /// Columns of a panel; from 24 to 126 the cost of a column differs by 5 % at most.
+        const PANEL: usize = 48;
+        let (n, n_free) = (self.n_dofs(), self.n_free());
+        let mut u = vec![0.0; forces.len()];
+        u.par_chunks_mut((PANEL * n).max(1))
+            .zip(forces.par_chunks((PANEL * n).max(1)))
+            .for_each(|(u, forces)| {
+                let width = forces.len() / n;
+                let mut panel = Vec::with_capacity(n_free * width);
+                for force in forces.chunks_exact(n) {
+                    panel.extend(self.dof_of_free.iter().map(|&dof| force[dof as usize]));
+                }
+                let mut memory = self.solve_memory(width);
+                self.solve_in_place(
+                    MatMut::from_column_major_slice_mut(&mut panel, n_free, width),
+                    &mut memory,
+                );
+                for (j, u) in u.chunks_exact_mut(n).enumerate() {
+                    for (i, &dof) in self.dof_of_free.iter().enumerate() {
+                        u[dof as usize] = panel[j * n_free + i];
+                    }
+                }
+            });
+        u
+    }
+
     /// As [`Self::solve`], with the held degrees of freedom displaced as prescribed.
     pub fn solve_prescribed(
         &self,
@@ -222,4 +251,57 @@ fn lower_triangle(
         SymbolicSparseColMat::new_checked(n, n, starts, None, rows),
         values,
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::element::Order;
+    use crate::progress::Silent;
+    use crate::{Material, Mesh, Quadrature, assemble_stiffness};
+
+    /// More forces than fit into one panel; each answer is that of the force alone. Panels of
+    /// other widths sum in another order, hence round-off and not bits.
+    #[test]
+    fn many_forces_are_solved_like_one() {
+        let nodes = vec![
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [0.0, 0.0, 1.0],
+        ];
+        let mesh = Mesh::new(
+            Order::Linear,
+            nodes,
+            vec![1, 2, 3, 4],
+            vec![0, 1, 2, 3],
+            vec![1],
+            vec![],
+        );
+        let mut supports = Supports::new(4);
+        for (node, components) in [
+            (0, [true; 3]),
+            (1, [false, true, true]),
+            (2, [false, false, true]),
+        ] {
+            supports.fix_node(node, components);
+        }
+        assert_eq!(supports.free_dofs().count(), 6);
+        assert!(supports.free_rigid_motions(&mesh).is_empty());
+        let material = Material::new(2e9, 0.3).unwrap();
+        let stiffness = assemble_stiffness(&mesh, &[material], &[0], Quadrature::Fast).unwrap();
+        let factor = FactoredStiffness::new(&stiffness, &supports, &Silent).unwrap();
+        let forces: Vec<f64> = (0..101 * 12)
+            .map(|i| f64::from((i * 37) % 23) - 11.0)
+            .collect();
+        let many = factor.solve_many(&forces);
+        for (force, u) in forces.chunks(12).zip(many.chunks(12)) {
+            let one = factor.solve(force);
+            let largest = one.iter().fold(0.0f64, |a, x| a.max(x.abs()));
+            for (a, b) in one.iter().zip(u) {
+                assert!((a - b).abs() <= 1e-13 * largest);
+            }
+        }
+        assert!(factor.solve_many(&[]).is_empty());
+    }
 }

@@ -7,7 +7,7 @@ use crate::{Error, quadrature};
 /// Nodal forces (3 node + component), N, of a uniform dead traction with the given total force.
 ///
 /// # Errors
-/// [`Error::NoFaces`].
+/// [`Error::NoFaces`], [`Error::NoArea`].
 pub fn traction_of_total_force(
     mesh: &Mesh,
     group: &Group,
@@ -22,6 +22,9 @@ pub fn traction_of_total_force(
             forces[3 * node + c] += size * total[c];
         }
     })?;
+    if !(area > 0.0 && area.is_finite()) {
+        return Err(Error::NoArea(group.name.clone(), area));
+    }
     for f in &mut forces {
         *f /= area;
     }
@@ -128,4 +131,39 @@ fn integrate_faces(
 
 fn norm(v: [f64; 3]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::Face;
+
+    #[test]
+    fn a_total_force_on_faces_without_area_is_refused() {
+        let nodes = vec![
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [2.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0],
+        ];
+        let group = Group {
+            name: "edge".to_owned(),
+            dimension: 2,
+            nodes: vec![0, 1, 2],
+            faces: vec![Face {
+                nodes: vec![0, 1, 2],
+            }],
+            elements: vec![],
+        };
+        let mesh = Mesh::new(
+            Order::Linear,
+            nodes,
+            vec![1, 2, 3, 4],
+            vec![0, 1, 2, 3],
+            vec![1],
+            vec![],
+        );
+        let error = traction_of_total_force(&mesh, &group, [1.0, 0.0, 0.0]).unwrap_err();
+        assert_eq!(error, Error::NoArea("edge".to_owned(), 0.0));
+    }
 }

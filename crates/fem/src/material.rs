@@ -7,6 +7,7 @@ use crate::Error;
 pub struct Material {
     young_modulus: f64,
     poisson_ratio: f64,
+    density: Option<f64>,
 }
 
 impl Material {
@@ -32,7 +33,31 @@ impl Material {
         Ok(Self {
             young_modulus,
             poisson_ratio,
+            density: None,
         })
+    }
+
+    /// With a density, kg/m³, positive; only inertia and gravity need one.
+    ///
+    /// # Errors
+    /// If it is not positive and finite.
+    pub fn with_density(self, density: f64) -> Result<Self, Error> {
+        if !(density > 0.0 && density.is_finite()) {
+            return Err(Error::Material {
+                name: "density",
+                value: density,
+                rule: "must be positive and finite (kg/m³)",
+            });
+        }
+        Ok(Self {
+            density: Some(density),
+            ..self
+        })
+    }
+
+    /// kg/m³, if given.
+    pub fn density(&self) -> Option<f64> {
+        self.density
     }
 
     /// Pa.
@@ -74,6 +99,14 @@ mod tests {
         ] {
             assert!(Material::new(e, nu).is_err(), "{e} {nu}");
         }
-        assert!(Material::new(2.7e9, 0.35).is_ok());
+        let material = Material::new(2.7e9, 0.35).unwrap();
+        assert_eq!(material.density(), None);
+        for rho in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(material.with_density(rho).is_err(), "{rho}");
+        }
+        assert_eq!(
+            material.with_density(1410.0).unwrap().density(),
+            Some(1410.0)
+        );
     }
 }

@@ -1,6 +1,7 @@
 //! Nodes, elements and named groups.
 
 pub mod gmsh;
+mod measure;
 mod quality;
 mod topology;
 

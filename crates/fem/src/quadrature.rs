@@ -9,10 +9,10 @@ pub enum Quadrature {
     /// for orders 1, 2 and 3. On curved elements it is an approximation that other programs share
     /// (the 4-point rule of C3D10).
     Fast,
-    /// A rule that is converged on moderately curved elements: degree 8 for order 2, degree 12
-    /// for order 3. At order 2 two degrees more change the stiffness by 2e-7 of its largest entry
-    /// on a curved clip of 5000 nodes, but by 3e-4 on one of 700 nodes, whose elements follow more
-    /// of the arc each: use `Degree(20)` there if the rule must not show.
+    /// Straight elements as `Fast`, which is exact for them; every curved element by the lowest
+    /// conical rule, from degree 11 to 29, that two degrees less would not have changed by 1e-6.
+    /// A fixed degree does not do: 8 is enough for all but two elements of a clip with 2641, but
+    /// leaves 1e-3 in the worst of the same clip with 297.
     Converged,
     /// A rule that integrates polynomials up to this degree exactly.
     Degree(u32),

@@ -143,20 +143,41 @@ pub fn stress_at_point(
     ))
 }
 
-/// Von Mises stress at every node, Pa: stress at each element's nodes, averaged over elements.
-pub fn nodal_von_mises(
+/// Stress at the nodes of an element, Pa, in the element's node order: its own, not averaged with
+/// that of its neighbours.
+pub fn element_nodal_stress(
     mesh: &Mesh,
     materials: &[Material],
     material_of_element: &[u32],
     u: &[f64],
-) -> Vec<f64> {
+    element: usize,
+) -> Vec<Tensor> {
+    let material = &materials[material_of_element[element] as usize];
+    mesh.order
+        .node_coordinates()
+        .into_iter()
+        .map(|l| {
+            stress(
+                material,
+                &strain(&displacement_gradient(mesh, u, element, l)),
+            )
+        })
+        .collect()
+}
+
+/// Stress at every node, Pa: that of each element at the node, averaged over its elements. Where
+/// materials meet, the mean of both sides, which neither has; zero at nodes of no element.
+pub fn nodal_stress(
+    mesh: &Mesh,
+    materials: &[Material],
+    material_of_element: &[u32],
+    u: &[f64],
+) -> Vec<Tensor> {
     let mut sum = vec![[[0.0; 3]; 3]; mesh.n_nodes()];
     let mut count = vec![0.0f64; mesh.n_nodes()];
-    let local = mesh.order.node_coordinates();
     for e in 0..mesh.n_elements() {
-        let material = &materials[material_of_element[e] as usize];
-        for (&node, &l) in mesh.element_nodes(e).iter().zip(&local) {
-            let s = stress(material, &strain(&displacement_gradient(mesh, u, e, l)));
+        let stresses = element_nodal_stress(mesh, materials, material_of_element, u, e);
+        for (&node, s) in mesh.element_nodes(e).iter().zip(stresses) {
             count[node as usize] += 1.0;
             for i in 0..3 {
                 for j in 0..3 {
@@ -165,9 +186,22 @@ pub fn nodal_von_mises(
             }
         }
     }
-    sum.iter()
+    sum.into_iter()
         .zip(count)
-        .map(|(s, n)| von_mises(&s.map(|row| row.map(|x| x / n.max(1.0)))))
+        .map(|(s, n)| s.map(|row| row.map(|x| x / n.max(1.0))))
+        .collect()
+}
+
+/// Von Mises stress at every node, Pa, of [`nodal_stress`].
+pub fn nodal_von_mises(
+    mesh: &Mesh,
+    materials: &[Material],
+    material_of_element: &[u32],
+    u: &[f64],
+) -> Vec<f64> {
+    nodal_stress(mesh, materials, material_of_element, u)
+        .iter()
+        .map(von_mises)
         .collect()
 }
 

@@ -2,6 +2,8 @@
 
 use nalgebra::{DMatrix, Matrix6};
 
+use crate::mesh::Mesh;
+
 /// Which components of which nodes are held.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Supports {
@@ -34,6 +36,20 @@ impl Supports {
     /// Whether all three components of a node are held.
     pub fn is_fixed_in_all(&self, node: u32) -> bool {
         self.held[3 * node as usize..][..3].iter().all(|h| *h)
+    }
+
+    /// Degrees of freedom that are not held, ascending.
+    pub fn free_dofs(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.held.len()).filter(|&dof| !self.held[dof])
+    }
+
+    /// Rigid motions of the whole mesh that these supports leave free, in words; of each piece by
+    /// itself in [`Mesh::check`].
+    pub fn free_rigid_motions(&self, mesh: &Mesh) -> Vec<String> {
+        let mut nodes = mesh.elements.clone();
+        nodes.sort_unstable();
+        nodes.dedup();
+        free_rigid_motions(&mesh.nodes, &nodes, self)
     }
 
     /// Number of degrees of freedom, held or not.

@@ -19,7 +19,7 @@ use glamx::DPose3;
 use super::{ActiveContact, ContactPart};
 
 /// Slack of the narrow list over that of the wide one.
-const NARROW_SHARE: f64 = 0.2;
+const NARROW_SHARE: f64 = 0.1;
 
 #[derive(Debug)]
 pub(super) struct WatchList {

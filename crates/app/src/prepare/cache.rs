@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use fem::{Compliance, ComplianceChecks};
 
 /// Changes whenever the meaning of the file or the numbers in it changes.
-pub const FORMAT: u32 = 1;
+pub const FORMAT: u32 = 2;
 
 const MAGIC: &[u8; 8] = b"SNAPINC\n";
 const HEADER: usize = 8 + 4 + 4 + 32 + 8 + 8 + 24;

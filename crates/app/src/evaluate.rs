@@ -1,6 +1,8 @@
 //! From a recording to what the report tells: moments worth a picture, extremes, verdicts.
 
 mod drawing;
+mod moments;
+mod words;
 
 use glam::DVec3;
 
@@ -10,16 +12,13 @@ use crate::engine::{Engine, Stage};
 use crate::fields::FieldSolver;
 use crate::machine::Machine;
 use crate::prepare::PreparedPart;
-use crate::prepare::budget::bytes;
 use crate::report::{
     ContactForce, Effect, Facts, Frame, Handbook, HandbookRow, Outputs, PaperStage, Phase, Run,
     StepRow, View,
 };
 use crate::scene::{EffectChoice, Scene, ToolShape};
 use crate::session::{Record, Recording, part_extent};
-
-/// Steps of which strain and rotation are looked at, besides those that are drawn.
-const SAMPLED_STEPS: usize = 40;
+use moments::Moments;
 
 /// Everything that a run is made of.
 pub(crate) struct Story<'a> {
@@ -236,181 +235,6 @@ impl Story<'_> {
         }
     }
 
-    /// What did not go as it should, in words.
-    fn troubles(&self) -> Vec<String> {
-        let records = &self.recording.records;
-        let count = |test: &dyn Fn(&Record) -> bool| records.iter().filter(|r| test(r)).count();
-        let safety = &self.recording.servo.safety;
-        let device = &self.recording.device;
-        let all = [
-            (
-                count(&|r| !r.report.converged) as u64,
-                "steps whose contact planes did not come to a stand",
-            ),
-            (
-                count(&|r| !r.report.lcp_solved) as u64,
-                "steps whose contact problem was not solved to its tolerance",
-            ),
-            (
-                count(&|r| r.report.dropped > 0) as u64,
-                "steps with more near nodes than accuracy.max_contacts",
-            ),
-            (
-                safety.samples_rejected(),
-                "poses of the device were refused",
-            ),
-            (
-                safety.wrenches_clamped,
-                "wrenches were cut to the device's limits",
-            ),
-            (
-                safety.wrenches_rate_limited,
-                "wrenches were slowed to the device's largest rate",
-            ),
-            (
-                device.thermally_limited,
-                "wrenches were cut to what the device bears for long",
-            ),
-        ];
-        all.into_iter()
-            .filter(|(n, _)| *n > 0)
-            .map(|(n, what)| format!("{n} {what}"))
-            .collect()
-    }
-
-    fn settings(&self) -> Vec<(String, String)> {
-        let scene = self.scene;
-        let (hand, material) = (&scene.hand, &scene.part.material);
-        let shape = match &scene.tool.shape {
-            ToolShape::Sphere { radius } => format!("sphere, radius {} mm", 1e3 * radius),
-            ToolShape::Cylinder {
-                radius,
-                half_length: None,
-            } => {
-                format!("cylinder without end, radius {} mm", 1e3 * radius)
-            }
-            ToolShape::Cylinder {
-                radius,
-                half_length: Some(h),
-            } => {
-                format!(
-                    "cylinder, radius {} mm, length {} mm",
-                    1e3 * radius,
-                    2e3 * h
-                )
-            }
-            ToolShape::Box { half_extents: h } => {
-                format!("box {} x {} x {} mm", 2e3 * h.x, 2e3 * h.y, 2e3 * h.z)
-            }
-            ToolShape::Capsule {
-                radius,
-                half_length,
-            } => {
-                format!(
-                    "capsule, radius {} mm, length {} mm",
-                    1e3 * radius,
-                    2e3 * half_length
-                )
-            }
-            ToolShape::HalfSpace => "half-space".to_owned(),
-            ToolShape::Mesh { file, .. } => file.display().to_string(),
-        };
-        let pair = |label: &str, value: String| (label.to_owned(), value);
-        vec![
-            pair("mesh", scene.part.mesh.display().to_string()),
-            pair(
-                "material",
-                format!(
-                    "{}E {:.4e} Pa, Poisson's ratio {}",
-                    material
-                        .name
-                        .as_ref()
-                        .map(|n| format!("{n}, "))
-                        .unwrap_or_default(),
-                    material.young_modulus,
-                    material.poisson_ratio
-                ),
-            ),
-            pair(
-                "quadrature",
-                format!("{:?}", scene.part.quadrature).to_lowercase(),
-            ),
-            pair("tool", shape),
-            pair(
-                "held by the handle",
-                format!("{:?}", scene.handle).to_lowercase(),
-            ),
-            pair(
-                "hand",
-                format!(
-                    "{} mm at {} mm/s, {} kg on {} N/m and {} N s/m",
-                    1e3 * hand.travel,
-                    1e3 * hand.speed,
-                    hand.mass,
-                    hand.stiffness,
-                    hand.damping
-                ),
-            ),
-            pair(
-                "virtual coupling",
-                format!(
-                    "{} N/m, {} N m/rad",
-                    scene.coupling.translational_stiffness, scene.coupling.rotational_stiffness
-                ),
-            ),
-            pair(
-                "device",
-                format!(
-                    "simulated Virtuose 6D, {} ms period, {}",
-                    1e3 * scene.device.servo_period,
-                    if scene.device.real_time {
-                        "in real time"
-                    } else {
-                        "as fast as possible"
-                    }
-                ),
-            ),
-            pair(
-                "contact iterations",
-                format!("{:?}", scene.accuracy.contact_iterations).to_lowercase(),
-            ),
-            pair(
-                "compliance",
-                bytes(8.0 * self.prepared.compliance.blocks.len() as f64),
-            ),
-        ]
-    }
-
-    fn checks(&self) -> Vec<(String, String)> {
-        let checks = &self.prepared.checks;
-        let pair = |label: &str, value: String| (label.to_owned(), value);
-        vec![
-            pair(
-                "compliance, asymmetry over largest entry",
-                format!("{:.1e}", checks.symmetry_rel),
-            ),
-            pair(
-                "compliance, residual |K x - e|",
-                format!("{:.1e}", checks.residual_rel),
-            ),
-            pair(
-                "compliance, smallest over largest Cholesky pivot",
-                format!("{:.1e}", checks.smallest_pivot_rel),
-            ),
-        ]
-    }
-
-    fn notes(&self) -> Vec<String> {
-        vec![
-            "Travel is that of the held body in the simulation; the handle is ahead of it by the force \
-             over the stiffness of the virtual coupling, which acts in series with the part."
-                .to_owned(),
-            "Contact is frictionless and quasi-static, displacements are linear; strain and rotation are \
-             the largest at the integration points."
-                .to_owned(),
-        ]
-    }
-
     fn handbook(&self, rows: &[StepRow]) -> Option<Handbook> {
         let hook = self.scene.handbook.as_ref()?;
         let young_modulus = self.scene.part.material.young_modulus;
@@ -525,83 +349,6 @@ fn paper(rows: &[StepRow]) -> Vec<PaperStage> {
         median(&|r| Some(of(r, &[Stage::Delassus, Stage::Lcp, Stage::Update]))),
         median(&|r| r.multiply_ns),
     )
-}
-
-/// Records worth a look, by index.
-struct Moments {
-    n: usize,
-    touch: Option<usize>,
-    peak: Option<usize>,
-    crest: Option<usize>,
-    pull: Option<usize>,
-}
-
-impl Moments {
-    fn of(recording: &Recording) -> Self {
-        let records = &recording.records;
-        let force: Vec<f64> = records.iter().map(|r| recording.resistance(r)).collect();
-        let end = records
-            .iter()
-            .position(|r| r.phase == device::Phase::Retract)
-            .unwrap_or(records.len());
-        let touch = records.iter().position(|r| r.report.contacts > 0);
-        let peak = touch.and_then(|_| (0..end).max_by(|&a, &b| force[a].total_cmp(&force[b])));
-        let crest = peak.and_then(|p| (p..end).find(|&i| force[i] <= 0.0));
-        let pull = crest.and_then(|c| (c..end).min_by(|&a, &b| force[a].total_cmp(&force[b])));
-        Self {
-            n: records.len(),
-            touch,
-            peak,
-            crest,
-            pull,
-        }
-    }
-
-    fn sampled(&self) -> Vec<usize> {
-        let mut all: Vec<usize> = self
-            .between(SAMPLED_STEPS)
-            .chain([self.peak, self.crest, self.pull].into_iter().flatten())
-            .collect();
-        all.sort_unstable();
-        all.dedup();
-        all
-    }
-
-    /// Evenly from the first touch to the end.
-    fn between(&self, count: usize) -> impl Iterator<Item = usize> + '_ {
-        let from = self.touch.unwrap_or(0);
-        let span = self.n.saturating_sub(from + 1);
-        (0..count.min(span)).map(move |k| from + k * span / count.max(1))
-    }
-
-    /// The named moments first, then what fills up to `count`, in order of time.
-    fn labelled(&self, count: usize) -> Vec<(String, usize)> {
-        let named = [
-            (self.peak, "peak"),
-            (self.n.checked_sub(1), "home"),
-            (self.pull, "pull"),
-            (self.touch, "first contact"),
-            (self.crest, "crest"),
-        ];
-        let mut moments: Vec<(String, usize)> = Vec::new();
-        for (index, label) in named {
-            if let Some(index) = index.filter(|i| moments.iter().all(|m| m.1 != *i)) {
-                moments.push((label.to_owned(), index));
-            }
-        }
-        moments.truncate(count);
-        let missing = count.saturating_sub(moments.len());
-        let touch = self.touch.unwrap_or(0);
-        let rise = self.peak.unwrap_or(self.n).saturating_sub(touch);
-        for k in 1..=missing {
-            let index = touch + k * rise / (missing + 1);
-            if index < self.n && moments.iter().all(|m| m.1 != index) {
-                moments.push(("rise".to_owned(), index));
-            }
-        }
-        moments.sort_by_key(|m| m.1);
-        moments
-    }
 }
 
 #[cfg(test)]

@@ -1,0 +1,183 @@
+//! Settings, checks, troubles and notes of a run, in words.
+
+use super::Story;
+use crate::prepare::budget::bytes;
+use crate::scene::ToolShape;
+use crate::session::Record;
+
+impl Story<'_> {
+    /// What did not go as it should, in words.
+    pub(super) fn troubles(&self) -> Vec<String> {
+        let records = &self.recording.records;
+        let count = |test: &dyn Fn(&Record) -> bool| records.iter().filter(|r| test(r)).count();
+        let safety = &self.recording.servo.safety;
+        let device = &self.recording.device;
+        let all = [
+            (
+                count(&|r| !r.report.converged) as u64,
+                "steps whose contact planes did not come to a stand",
+            ),
+            (
+                count(&|r| !r.report.lcp_solved) as u64,
+                "steps whose contact problem was not solved to its tolerance",
+            ),
+            (
+                count(&|r| r.report.dropped > 0) as u64,
+                "steps with more near nodes than accuracy.max_contacts",
+            ),
+            (
+                safety.samples_rejected(),
+                "poses of the device were refused",
+            ),
+            (
+                safety.wrenches_clamped,
+                "wrenches were cut to the device's limits",
+            ),
+            (
+                safety.wrenches_rate_limited,
+                "wrenches were slowed to the device's largest rate",
+            ),
+            (
+                device.thermally_limited,
+                "wrenches were cut to what the device bears for long",
+            ),
+        ];
+        all.into_iter()
+            .filter(|(n, _)| *n > 0)
+            .map(|(n, what)| format!("{n} {what}"))
+            .collect()
+    }
+
+    pub(super) fn settings(&self) -> Vec<(String, String)> {
+        let scene = self.scene;
+        let (hand, material) = (&scene.hand, &scene.part.material);
+        let shape = match &scene.tool.shape {
+            ToolShape::Sphere { radius } => format!("sphere, radius {} mm", 1e3 * radius),
+            ToolShape::Cylinder {
+                radius,
+                half_length: None,
+            } => {
+                format!("cylinder without end, radius {} mm", 1e3 * radius)
+            }
+            ToolShape::Cylinder {
+                radius,
+                half_length: Some(h),
+            } => {
+                format!(
+                    "cylinder, radius {} mm, length {} mm",
+                    1e3 * radius,
+                    2e3 * h
+                )
+            }
+            ToolShape::Box { half_extents: h } => {
+                format!("box {} x {} x {} mm", 2e3 * h.x, 2e3 * h.y, 2e3 * h.z)
+            }
+            ToolShape::Capsule {
+                radius,
+                half_length,
+            } => {
+                format!(
+                    "capsule, radius {} mm, length {} mm",
+                    1e3 * radius,
+                    2e3 * half_length
+                )
+            }
+            ToolShape::HalfSpace => "half-space".to_owned(),
+            ToolShape::Mesh { file, .. } => file.display().to_string(),
+        };
+        let pair = |label: &str, value: String| (label.to_owned(), value);
+        vec![
+            pair("mesh", scene.part.mesh.display().to_string()),
+            pair(
+                "material",
+                format!(
+                    "{}E {:.4e} Pa, Poisson's ratio {}",
+                    material
+                        .name
+                        .as_ref()
+                        .map(|n| format!("{n}, "))
+                        .unwrap_or_default(),
+                    material.young_modulus,
+                    material.poisson_ratio
+                ),
+            ),
+            pair(
+                "quadrature",
+                format!("{:?}", scene.part.quadrature).to_lowercase(),
+            ),
+            pair("tool", shape),
+            pair(
+                "held by the handle",
+                format!("{:?}", scene.handle).to_lowercase(),
+            ),
+            pair(
+                "hand",
+                format!(
+                    "{} mm at {} mm/s, {} kg on {} N/m and {} N s/m",
+                    1e3 * hand.travel,
+                    1e3 * hand.speed,
+                    hand.mass,
+                    hand.stiffness,
+                    hand.damping
+                ),
+            ),
+            pair(
+                "virtual coupling",
+                format!(
+                    "{} N/m, {} N m/rad",
+                    scene.coupling.translational_stiffness, scene.coupling.rotational_stiffness
+                ),
+            ),
+            pair(
+                "device",
+                format!(
+                    "simulated Virtuose 6D, {} ms period, {}",
+                    1e3 * scene.device.servo_period,
+                    if scene.device.real_time {
+                        "in real time"
+                    } else {
+                        "as fast as possible"
+                    }
+                ),
+            ),
+            pair(
+                "contact iterations",
+                format!("{:?}", scene.accuracy.contact_iterations).to_lowercase(),
+            ),
+            pair(
+                "compliance",
+                bytes(8.0 * self.prepared.compliance.blocks.len() as f64),
+            ),
+        ]
+    }
+
+    pub(super) fn checks(&self) -> Vec<(String, String)> {
+        let checks = &self.prepared.checks;
+        let pair = |label: &str, value: String| (label.to_owned(), value);
+        vec![
+            pair(
+                "compliance, asymmetry over largest entry",
+                format!("{:.1e}", checks.symmetry_rel),
+            ),
+            pair(
+                "compliance, residual |K x - e|",
+                format!("{:.1e}", checks.residual_rel),
+            ),
+            pair(
+                "compliance, smallest over largest Cholesky pivot",
+                format!("{:.1e}", checks.smallest_pivot_rel),
+            ),
+        ]
+    }
+
+    pub(super) fn notes(&self) -> Vec<String> {
+        vec![
+            "Travel is that of the held body in the simulation; the handle is ahead of it by the force \
+             over the stiffness of the virtual coupling, which acts in series with the part."
+                .to_owned(),
+            "Contact is frictionless and quasi-static, displacements are linear; strain and rotation are \
+             the largest at the integration points."
+                .to_owned(),
+        ]
+    }
+}

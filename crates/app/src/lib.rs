@@ -22,6 +22,7 @@ pub mod report;
 pub mod scene;
 pub mod session;
 pub mod setup;
+pub mod shape;
 pub mod study;
 
 pub use cli::run;

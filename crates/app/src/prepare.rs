@@ -36,6 +36,8 @@ pub struct PartSpec {
     pub length_scale: f64,
     /// Order that the scene asks for; `None`: the mesh's own.
     pub order: Option<u8>,
+    /// How often each element is divided into eight, before the order is changed.
+    pub refinements: u8,
     /// Elasticity.
     pub material: Material,
     /// Held groups and which of x, y, z is held.
@@ -135,6 +137,9 @@ pub fn load(spec: &PartSpec) -> Result<LoadedPart, Error> {
             mesh.order as usize,
             mesh.order as usize
         )));
+    }
+    if spec.refinements > 0 {
+        return Err(Error::Input("meshes are not refined yet".to_owned()));
     }
     let mut supports = Supports::new(mesh.n_nodes());
     for (name, components) in &spec.fixed {

@@ -310,9 +310,15 @@ pub enum DeviceModel {
     Virtuose6d,
 }
 
-/// What accuracy is asked for.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// What accuracy is asked for. The order of the elements is [`Part::order`].
+#[derive(Clone, Debug, PartialEq)]
 pub struct Accuracy {
+    /// The goal, if one was named; its settings are in the other fields.
+    pub preset: Option<Preset>,
+    /// µs, > 0: the settings are to be chosen by measurement, so that 99.9 % of the steps keep it.
+    pub budget_us: Option<f64>,
+    /// Which interface nodes are free.
+    pub adaptive: Adaptive,
     /// How often contact planes are put on anew within a step.
     pub contact_iterations: ContactIterations,
     /// Candidates nearer than this get a contact plane, m, > 0; `None`: chosen by the program.
@@ -325,6 +331,109 @@ pub struct Accuracy {
     pub scalar: Scalar,
     /// Where the displacement multiply runs.
     pub multiply: Multiply,
+    /// Other meshes of the same part, for the accuracy study; they exist.
+    pub meshes: Vec<PathBuf>,
+}
+
+impl Accuracy {
+    /// Settings of a preset, or what a scene without one has.
+    pub fn of(preset: Option<Preset>) -> Self {
+        let plain = Self {
+            preset,
+            budget_us: None,
+            adaptive: Adaptive::Off,
+            contact_iterations: ContactIterations::Converged,
+            near_distance: None,
+            lcp_tolerance: raw::default::LCP_TOLERANCE,
+            max_contacts: raw::default::MAX_CONTACTS as usize,
+            scalar: Scalar::F64,
+            multiply: Multiply::Auto,
+            meshes: Vec::new(),
+        };
+        let where_seen = Adaptive::On {
+            method: PMethod::Select,
+            free: FreeNodes::Indicator(SEEN_BEND),
+        };
+        match preset {
+            Some(Preset::Fast) => Self {
+                adaptive: where_seen,
+                contact_iterations: ContactIterations::Times(2),
+                lcp_tolerance: 1e-6,
+                scalar: Scalar::F32,
+                ..plain
+            },
+            Some(Preset::Balanced) => Self {
+                adaptive: where_seen,
+                ..plain
+            },
+            Some(Preset::Exact) => Self {
+                lcp_tolerance: 1e-13,
+                ..plain
+            },
+            None => plain,
+        }
+    }
+}
+
+/// Bend of an edge, as a share of the largest displacement, that a picture of a thousand pixels
+/// begins to show.
+const SEEN_BEND: f64 = 1e-3;
+
+/// A goal that stands for all settings of accuracy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Preset {
+    /// Two passes over the contact planes, drawn shape interpolated and in 32 bits.
+    Fast,
+    /// Converged planes; interface nodes free where the part is seen to bend.
+    Balanced,
+    /// Order 3, all nodes free, tightest tolerance.
+    Exact,
+}
+
+impl Preset {
+    /// As in the file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fast => "fast",
+            Self::Balanced => "balanced",
+            Self::Exact => "exact",
+        }
+    }
+}
+
+/// The p-method (Duriez et al. 2004, section 3.2).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Adaptive {
+    /// Every interface node is free.
+    #[default]
+    Off,
+    /// Some are.
+    On {
+        /// How the others follow.
+        method: PMethod,
+        /// Which are free.
+        free: FreeNodes,
+    },
+}
+
+/// How constrained interface nodes follow their principal nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PMethod {
+    /// Forces and free nodes as at full order; the others are interpolated for drawing.
+    Select,
+    /// Galerkin's method on principal and free nodes: a stiffer part.
+    Constrain,
+}
+
+/// Which interface nodes are free.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FreeNodes {
+    /// Within this distance of a contact, m, >= 0.
+    Radius(f64),
+    /// Where the edge bends by more than this share of the largest displacement, > 0.
+    Indicator(f64),
+    /// As many as a step of this many µs allows, nearest to the contact first, > 0.
+    BudgetUs(f64),
 }
 
 /// How often contact planes are put on anew within a step.
@@ -342,6 +451,8 @@ pub enum Scalar {
     /// 64-bit.
     #[default]
     F64,
+    /// 32-bit.
+    F32,
 }
 
 /// Where the displacement multiply runs.

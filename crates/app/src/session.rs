@@ -15,10 +15,10 @@ use device::{
 use fem::Mesh;
 use glam::DVec3;
 use glamx::DPose3;
-use gpu::{Layout, Multiply, Scalar};
 
 use crate::engine::{ActiveContact, Engine, StepReport};
 use crate::prepare::PreparedPart;
+use crate::shape::{self, Shape};
 use crate::{Error, interrupt};
 
 /// Servo periods between two evaluations of the whole surface: 60 Hz at 1 kHz.
@@ -120,6 +120,7 @@ pub fn run(
     spec: &SessionSpec,
     prepared: &PreparedPart,
     engine: &mut Engine,
+    shape: &mut Shape,
     progress: &dyn fem::Progress,
 ) -> Result<Recording, Error> {
     refuse_overlap(spec, &prepared.loaded.mesh, engine)?;
@@ -138,8 +139,6 @@ pub fn run(
     let n_periods = script.periods(spec.period_s);
     let hand = SimulatedHand::new(spec.hand, script, spec.period_s)?;
     let device = Simulated::new(SimulatedSettings::default(), hand)?;
-    let layout = Layout::new(prepared.loaded.rows.len(), prepared.loaded.candidates.len())?;
-    let multiply = gpu::on_cpu(layout, &prepared.compliance.blocks, Scalar::F64)?;
     let session = Session {
         spec,
         script,
@@ -153,7 +152,7 @@ pub fn run(
             max_surface_displacement: 0.0,
             contacts: Vec::with_capacity(64 * n_periods as usize),
         },
-        surface: Surface::new(multiply, prepared),
+        shape,
     };
     let settings = ServoSettings::for_limits(device::HapticDevice::limits(&device));
     if spec.real_time {
@@ -165,51 +164,13 @@ pub fn run(
     }
 }
 
-/// The surface multiply with its buffers.
-struct Surface {
-    multiply: Box<dyn Multiply>,
-    columns: Vec<u32>,
-    forces: Vec<f64>,
-    displacement: Vec<f64>,
-}
-
-impl Surface {
-    fn new(multiply: Box<dyn Multiply>, prepared: &PreparedPart) -> Self {
-        let n = prepared.loaded.candidates.len();
-        Self {
-            multiply,
-            columns: Vec::with_capacity(n),
-            forces: Vec::with_capacity(3 * n),
-            displacement: vec![0.0; 3 * prepared.loaded.rows.len()],
-        }
-    }
-
-    /// Displacement of the whole surface; returns the largest, m.
-    fn update(&mut self, contacts: &[ActiveContact]) -> Result<f64, gpu::Error> {
-        self.columns.clear();
-        self.forces.clear();
-        for c in contacts {
-            self.columns.push(c.candidate);
-            self.forces.extend(c.force_on_part.to_array());
-        }
-        self.multiply
-            .multiply_into(&self.columns, &self.forces, &mut self.displacement)?;
-        let squared = self
-            .displacement
-            .chunks_exact(3)
-            .map(|u| u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
-            .fold(0.0, f64::max);
-        Ok(squared.sqrt())
-    }
-}
-
 struct Session<'a> {
     spec: &'a SessionSpec,
     script: Script,
     start: DPose3,
     engine: &'a mut Engine,
     recording: Recording,
-    surface: Surface,
+    shape: &'a mut Shape,
 }
 
 impl Session<'_> {
@@ -295,7 +256,7 @@ impl Session<'_> {
     /// What the display would do between two steps: the whole surface.
     fn display(&mut self) -> Result<(), Error> {
         let begun = Instant::now();
-        let largest = self.surface.update(self.engine.active_contacts())?;
+        let largest = shape::largest(self.shape.update(self.engine.active_contacts())?);
         let elapsed = begun.elapsed().as_nanos() as u64;
         self.recording.max_surface_displacement =
             self.recording.max_surface_displacement.max(largest);

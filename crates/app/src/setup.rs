@@ -30,6 +30,7 @@ pub fn part_spec(scene: &Scene) -> Result<PartSpec, Error> {
         mesh_path: scene.part.mesh.clone(),
         length_scale: scene.length_scale,
         order: scene.part.order,
+        refinements: 0,
         material: Material::new(material.young_modulus, material.poisson_ratio)
             .map_err(|e| Error::part(&scene.path, e))?,
         fixed: scene

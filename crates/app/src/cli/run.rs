@@ -13,6 +13,7 @@ use crate::prepare::prepare;
 use crate::progress::Ui;
 use crate::report::{Curve, Run, summary, write_all};
 use crate::scene::Scene;
+use crate::shape::Shape;
 use crate::{Error, session, setup};
 
 #[derive(Debug, Args)]
@@ -47,7 +48,8 @@ pub(super) fn run(args: &RunArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u8
     let mut spec = setup::session(&scene);
     spec.real_time |= args.real_time;
     let progress = ui.progress();
-    let recording = session::run(&spec, &prepared, &mut engine, &progress)?;
+    let mut shape = Shape::new(&prepared, &scene.accuracy)?;
+    let recording = session::run(&spec, &prepared, &mut engine, &mut shape, &progress)?;
     let story = Story {
         scene: &scene,
         prepared: &prepared,

@@ -10,8 +10,14 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{self, Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 
+mod accuracy;
+
 use super::error::{SceneError, line_of, plain, suggestion};
 use super::{DeviceModel, Handle, QuadratureRule, Units};
+pub(super) use accuracy::{
+    AccuracyKeys, AccuracyRaw, AdaptiveKeys, AdaptiveRaw, IterationsRaw, MethodRaw, MultiplyRaw,
+    PresetRaw, ScalarRaw,
+};
 
 /// Values of keys that are not written.
 pub(super) mod default {
@@ -124,7 +130,9 @@ pub(super) struct SceneRaw {
     /// The haptic device.
     #[serde(default)]
     pub(super) device: DeviceRaw,
-    /// What accuracy costs time, and how much of it is asked for.
+    /// What accuracy costs time, and how much of it is asked for: these keys, or one word for all
+    /// of them, `accuracy = "fast"`, `"balanced"` or `"exact"`, or `accuracy = { budget_us = 200 }`.
+    /// `snapin accuracy` shows what each choice costs in this scene.
     #[serde(default)]
     pub(super) accuracy: AccuracyRaw,
     /// Effects beyond the small-strain, frictionless, quasi-static model. `"off"`: not looked at.
@@ -144,8 +152,8 @@ pub(super) struct SceneRaw {
 pub(super) struct PartRaw {
     /// Gmsh mesh (`.msh`, version 4.1, ASCII or binary) of tetrahedra, relative to the scene file.
     pub(super) mesh: At<String>,
-    /// Order of the elements, 1, 2 or 3. This version does not change a mesh's order: another
-    /// one than the mesh's own is refused.
+    /// Order of the elements, 1, 2 or 3. Another one than the mesh's own raises or lowers it; new
+    /// nodes lie on the mesh's curved edges and faces. The same as `accuracy.order`.
     #[schemars(range(min = 1, max = 3), extend("x-default" = "the mesh's own"))]
     pub(super) order: Option<At<i64>>,
     /// Material of the part; may be its own section `[part.material]`.
@@ -483,100 +491,6 @@ pub(super) struct DeviceRaw {
     pub(super) servo_period: Option<At<f64>>,
     /// Whether each step waits for its moment on the clock; else steps follow each other at once.
     pub(super) real_time: bool,
-}
-
-/// How often contact planes are put on anew.
-#[derive(Debug)]
-pub(super) enum IterationsRaw {
-    Converged,
-    Times(i64),
-}
-
-impl<'de> Deserialize<'de> for IterationsRaw {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Iterations;
-        impl Visitor<'_> for Iterations {
-            type Value = IterationsRaw;
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("\"converged\" or a number from 1 to 50")
-            }
-            fn visit_str<E: de::Error>(self, word: &str) -> Result<IterationsRaw, E> {
-                match word {
-                    "converged" => Ok(IterationsRaw::Converged),
-                    _ => Err(E::unknown_variant(word, &["converged"])),
-                }
-            }
-            fn visit_i64<E: de::Error>(self, times: i64) -> Result<IterationsRaw, E> {
-                Ok(IterationsRaw::Times(times))
-            }
-        }
-        deserializer.deserialize_any(Iterations)
-    }
-}
-
-impl JsonSchema for IterationsRaw {
-    fn inline_schema() -> bool {
-        true
-    }
-    fn schema_name() -> std::borrow::Cow<'static, str> {
-        "ContactIterations".into()
-    }
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({
-            "x-type": "`\"converged\"` or integer",
-            "anyOf": [
-                { "const": "converged" },
-                { "type": "integer", "minimum": 1, "maximum": 50 }
-            ]
-        })
-    }
-}
-
-/// Number type of the displacement multiply.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub(super) enum ScalarRaw {
-    F64,
-    /// not in this version.
-    F32,
-}
-
-/// Where the displacement multiply runs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub(super) enum MultiplyRaw {
-    /// the fastest that is there.
-    Auto,
-    /// the processor.
-    Cpu,
-    /// not in this version.
-    Gpu,
-}
-
-#[derive(Debug, Default, serde::Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub(super) struct AccuracyRaw {
-    /// How often contact planes are put on anew at the new positions within one step: until the
-    /// displacement no longer changes, or 1 to 50 times.
-    #[schemars(extend("default" = "converged"))]
-    pub(super) contact_iterations: Option<At<IterationsRaw>>,
-    /// Nodes nearer to the tool than this get a contact plane, above 0.
-    #[schemars(extend("x-quantity" = "length", "x-default" = "chosen from the tool's motion"))]
-    pub(super) near_distance: Option<At<f64>>,
-    /// Largest residual of the contact solution, scaled by its largest terms, 1e-15 to 1e-2;
-    /// what is beyond it is reported.
-    #[schemars(extend("x-quantity" = "number", "default" = default::LCP_TOLERANCE))]
-    pub(super) lcp_tolerance: Option<At<f64>>,
-    /// Contact planes in one step, 1 to 5000; beyond it the deepest are kept and the rest is
-    /// counted and reported.
-    #[schemars(range(min = 1, max = 5000), extend("default" = default::MAX_CONTACTS))]
-    pub(super) max_contacts: Option<At<i64>>,
-    /// Number type of the displacement multiply; forces are always computed in f64.
-    #[schemars(extend("default" = "f64"))]
-    pub(super) scalar: Option<At<ScalarRaw>>,
-    /// Where the displacement multiply runs.
-    #[schemars(extend("default" = "auto"))]
-    pub(super) multiply: Option<At<MultiplyRaw>>,
 }
 
 /// How an effect is to be treated.

@@ -69,7 +69,11 @@ pub fn markdown() -> String {
         "```\n\nThe scenes in `scenes/` are whole ones to start from.\n\n## Top level\n\n",
     );
     let names = field_names::<raw::SceneRaw>();
-    let is_section = |name: &str| schema["properties"][name]["type"] == "object";
+    let is_section = |name: &str| match &schema["properties"][name]["type"] {
+        // Either a section or one word for it.
+        Value::Array(types) => types.iter().any(|name| name == "object"),
+        name => name == "object",
+    };
     table(
         &mut out,
         &schema,
@@ -107,7 +111,7 @@ fn section_keys(section: &str) -> &'static [&'static str] {
         "hand" => field_names::<raw::HandRaw>(),
         "coupling" => field_names::<raw::CouplingRaw>(),
         "device" => field_names::<raw::DeviceRaw>(),
-        "accuracy" => field_names::<raw::AccuracyRaw>(),
+        "accuracy" => field_names::<raw::AccuracyKeys>(),
         "effects" => field_names::<raw::EffectsRaw>(),
         "output" => field_names::<raw::OutputRaw>(),
         "handbook" => field_names::<raw::HandbookRaw>(),

@@ -425,8 +425,47 @@ fn refusals_name_line_key_and_mend() {
             "clip.toml:22: friction has no choice `onn`; the nearest is `on`",
         ),
         (
-            adding("[accuracy]\nscalar = \"f32\"\n"),
-            "clip.toml:22: scalar \"f32\" is not in this version; use \"f64\" or leave the key out",
+            with("title = \"Clip\"", "accuracy = \"quick\""),
+            "clip.toml:1: accuracy has no choice `quick`; the nearest is `exact`, all are `fast`, `balanced`, `exact`",
+        ),
+        (
+            adding("[accuracy]\norder = 1\npreset = \"best\"\n"),
+            "clip.toml:23: preset has no choice `best`; the nearest is `fast`",
+        ),
+        (
+            read(format!(
+                "accuracy = {{ order = 3 }}\n{}",
+                CLIP.replace("\n\n[part]", "\n[part]\norder = 2")
+            )),
+            "clip.toml:1: accuracy.order 3 and part.order 2 differ; leave one of the two out",
+        ),
+        (
+            adding("[accuracy]\nbudget_us = 0\n"),
+            "clip.toml:22: budget_us 0 must be above 0; write a positive number",
+        ),
+        (
+            adding("[accuracy]\nbudget_us = 200.0\norder = 2\n"),
+            "clip.toml:22: budget_us chooses order itself, but order is written too; leave out budget_us or order",
+        ),
+        (
+            adding("[accuracy]\nadaptive = -1.0\n"),
+            "clip.toml:22: adaptive radius -1 must not be negative; write 0 or more",
+        ),
+        (
+            adding("[accuracy]\nadaptive = \"on\"\n"),
+            "clip.toml:22: adaptive has no choice `on`; the nearest is `off`, all are `off`",
+        ),
+        (
+            adding("[accuracy]\nadaptive = { method = \"select\" }\n"),
+            "clip.toml:22: adaptive says nothing of which nodes are free; write radius, indicator or budget_us",
+        ),
+        (
+            adding("[accuracy]\nadaptive = { radius = 1.0, indicator = 0.1 }\n"),
+            "clip.toml:22: adaptive says more than once which nodes are free; keep one of radius, indicator and budget_us",
+        ),
+        (
+            adding("[accuracy]\nadaptive = { raduis = 1.0 }\n"),
+            "clip.toml:22: unknown key `raduis`; the nearest is `radius`",
         ),
         (
             adding("[accuracy]\nmultiply = \"gpu\"\n"),
@@ -477,6 +516,60 @@ fn refusals_name_line_key_and_mend() {
         );
         assert!(!text.contains('\n'), "{text}");
     }
+}
+
+/// Meshes of the accuracy study must be there too.
+#[test]
+fn a_mesh_of_the_study_that_is_not_there_is_told() {
+    let text = adding("[accuracy]\nmeshes = [\"none.msh\"]\n")
+        .unwrap_err()
+        .to_string();
+    assert!(
+        text.contains("clip.toml:22: accuracy.meshes file"),
+        "{text}"
+    );
+    assert!(text.contains("none.msh does not exist"), "{text}");
+}
+
+/// A preset is what its settings are, and a key beside it takes precedence.
+#[test]
+fn a_preset_sets_all_and_a_key_beside_it_wins() {
+    let scene = with("title = \"Clip\"", "accuracy = \"exact\"").unwrap();
+    assert_eq!(scene.part.order, Some(3));
+    assert_eq!(scene.accuracy, Accuracy::of(Some(Preset::Exact)));
+    let scene = adding("[accuracy]\npreset = \"fast\"\nscalar = \"f64\"\n").unwrap();
+    assert_eq!(scene.part.order, None);
+    assert_eq!(scene.accuracy.scalar, Scalar::F64);
+    assert_eq!(
+        scene.accuracy.contact_iterations,
+        ContactIterations::Times(2)
+    );
+    let scene = with("title = \"Clip\"", "accuracy = { budget_us = 200 }").unwrap();
+    assert_eq!(scene.accuracy.budget_us, Some(200.0));
+}
+
+/// The p-method is told by a radius or by a table, lengths in the scene's units.
+#[test]
+fn adaptive_is_off_a_radius_or_a_table() {
+    let adaptive = |value: &str| {
+        let text = format!("units = \"mm-N-MPa\"\naccuracy.adaptive = {value}\n{CLIP}");
+        read(text).unwrap().accuracy.adaptive
+    };
+    let on = |method, free| Adaptive::On { method, free };
+    assert_eq!(adaptive("\"off\""), Adaptive::Off);
+    assert_eq!(adaptive("2"), on(PMethod::Select, FreeNodes::Radius(2e-3)));
+    assert_eq!(
+        adaptive("{ method = \"constrain\", radius = 0.5 }"),
+        on(PMethod::Constrain, FreeNodes::Radius(0.5e-3))
+    );
+    assert_eq!(
+        adaptive("{ indicator = 0.01 }"),
+        on(PMethod::Select, FreeNodes::Indicator(0.01))
+    );
+    assert_eq!(
+        adaptive("{ budget_us = 50 }"),
+        on(PMethod::Select, FreeNodes::BudgetUs(50.0))
+    );
 }
 
 /// A mesh that is not there is told with the line that names it.

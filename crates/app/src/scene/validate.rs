@@ -1,18 +1,18 @@
 //! From keys as written to a scene that makes sense, in SI.
 
+mod accuracy;
+
 use std::path::{Path, PathBuf};
 
 use glam::{DQuat, DVec3};
 use glamx::DPose3;
 
 use super::error::{SceneError, line_of, plain};
-use super::raw::{
-    self, At, EffectRaw, IterationsRaw, MultiplyRaw, ScalarRaw, ShapeRaw, Vector, default,
-};
+use super::raw::{self, At, EffectRaw, ShapeRaw, Vector, default};
 use super::units::{Quantity, to_si};
 use super::{
-    Accuracy, ContactIterations, Coupling, Device, EffectChoice, Effects, Fixed, GroupName, Hand,
-    Handbook, Material, Multiply, Output, Part, Scalar, Scene, Tool, ToolShape, Units,
+    Coupling, Device, EffectChoice, Effects, Fixed, GroupName, Hand, Handbook, Material, Output,
+    Part, Scene, Tool, ToolShape, Units,
 };
 
 /// Servo periods in one run: 10 000 s at 1 kHz. More is a slip of the units, and would fill disks.
@@ -36,13 +36,13 @@ pub(super) fn scene(raw: raw::SceneRaw, source: String, path: &Path) -> Result<S
         }),
         units,
         length_scale: to_si(units, Quantity::Length),
-        part: check.part(raw.part)?,
+        part: check.part(raw.part, &raw.accuracy.0)?,
         tool: check.tool(&raw.tool)?,
         handle: raw.holds.handle,
         hand: check.hand(&raw.hand, &device)?,
         coupling: check.coupling(&raw.coupling)?,
         device,
-        accuracy: check.accuracy(&raw.accuracy)?,
+        accuracy: check.accuracy(&raw.accuracy.0)?,
         effects: check.effects(&raw.effects)?,
         output: check.output(&raw.output)?,
         handbook: raw
@@ -197,12 +197,9 @@ impl Check<'_> {
         })
     }
 
-    fn part(&self, raw: raw::PartRaw) -> Result<Part, SceneError> {
+    fn part(&self, raw: raw::PartRaw, accuracy: &raw::AccuracyKeys) -> Result<Part, SceneError> {
         let mend = "paths are relative to the scene file; scenes/README.md shows how to make one";
-        let order = match &raw.order {
-            Some(at) => Some(self.integer("order", at, 1, 3)? as u8),
-            None => None,
-        };
+        let order = self.order(accuracy.order.as_ref(), raw.order.as_ref(), accuracy.preset)?;
         let none = |key: &str, offset| {
             self.error(
                 offset,
@@ -526,68 +523,6 @@ impl Check<'_> {
             model: raw.model,
             servo_period,
             real_time: raw.real_time,
-        })
-    }
-
-    fn accuracy(&self, raw: &raw::AccuracyRaw) -> Result<Accuracy, SceneError> {
-        if let Some(at) = raw.scalar.as_ref().filter(|at| at.value == ScalarRaw::F32) {
-            let what = "scalar \"f32\" is not in this version".to_owned();
-            return Err(self.error(at.offset, what, "use \"f64\" or leave the key out"));
-        }
-        if let Some(at) = raw
-            .multiply
-            .as_ref()
-            .filter(|at| at.value == MultiplyRaw::Gpu)
-        {
-            let what = "multiply \"gpu\" is not in this version".to_owned();
-            return Err(self.error(at.offset, what, "use \"auto\" or \"cpu\""));
-        }
-        let contact_iterations = match &raw.contact_iterations {
-            None
-            | Some(At {
-                value: IterationsRaw::Converged,
-                ..
-            }) => ContactIterations::Converged,
-            Some(At {
-                value: IterationsRaw::Times(times),
-                offset,
-            }) => {
-                let at = At {
-                    value: *times,
-                    offset: *offset,
-                };
-                ContactIterations::Times(self.integer("contact_iterations", &at, 1, 50)? as u32)
-            }
-        };
-        let near = raw.near_distance.as_ref();
-        let near_distance = near
-            .map(|at| self.number("near_distance", at, Quantity::Length, Range::Positive))
-            .transpose()?;
-        let lcp_tolerance = match &raw.lcp_tolerance {
-            None => default::LCP_TOLERANCE,
-            Some(at) => {
-                let value = self.number("lcp_tolerance", at, Quantity::Number, Range::Positive)?;
-                if !(1e-15..=1e-2).contains(&value) {
-                    let what = format!("lcp_tolerance {value:e} is not between 1e-15 and 1e-2");
-                    return Err(self.error(at.offset, what, "1e-10 is safe with 64-bit numbers"));
-                }
-                value
-            }
-        };
-        let most = raw.max_contacts.as_ref();
-        let max_contacts = most.map_or(Ok(default::MAX_CONTACTS), |at| {
-            self.integer("max_contacts", at, 1, 5000)
-        })?;
-        Ok(Accuracy {
-            contact_iterations,
-            near_distance,
-            lcp_tolerance,
-            max_contacts: max_contacts as usize,
-            scalar: Scalar::F64,
-            multiply: match raw.multiply.as_ref().map(|at| at.value) {
-                Some(MultiplyRaw::Cpu) => Multiply::Cpu,
-                _ => Multiply::Auto,
-            },
         })
     }
 

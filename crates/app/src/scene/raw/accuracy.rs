@@ -1,0 +1,269 @@
+//! Keys of `[accuracy]` as written.
+
+use std::fmt;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{self, Deserialize, Deserializer, MapAccess, Visitor};
+
+use super::{At, default};
+
+/// How often contact planes are put on anew.
+#[derive(Debug)]
+pub(in crate::scene) enum IterationsRaw {
+    Converged,
+    Times(i64),
+}
+
+impl<'de> Deserialize<'de> for IterationsRaw {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Iterations;
+        impl Visitor<'_> for Iterations {
+            type Value = IterationsRaw;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("\"converged\" or a number from 1 to 50")
+            }
+            fn visit_str<E: de::Error>(self, word: &str) -> Result<IterationsRaw, E> {
+                match word {
+                    "converged" => Ok(IterationsRaw::Converged),
+                    _ => Err(E::unknown_variant(word, &["converged"])),
+                }
+            }
+            fn visit_i64<E: de::Error>(self, times: i64) -> Result<IterationsRaw, E> {
+                Ok(IterationsRaw::Times(times))
+            }
+        }
+        deserializer.deserialize_any(Iterations)
+    }
+}
+
+impl JsonSchema for IterationsRaw {
+    fn inline_schema() -> bool {
+        true
+    }
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "ContactIterations".into()
+    }
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "x-type": "`\"converged\"` or integer",
+            "anyOf": [
+                { "const": "converged" },
+                { "type": "integer", "minimum": 1, "maximum": 50 }
+            ]
+        })
+    }
+}
+
+/// Number type of the displacement multiply.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub(in crate::scene) enum ScalarRaw {
+    /// 64 bits.
+    F64,
+    /// 32 bits: half the memory to read, about seven digits of the drawn shape.
+    F32,
+}
+
+/// Where the displacement multiply runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub(in crate::scene) enum MultiplyRaw {
+    /// the fastest that is there.
+    Auto,
+    /// the processor.
+    Cpu,
+    /// not in this version.
+    Gpu,
+}
+
+/// One word for all settings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub(in crate::scene) enum PresetRaw {
+    /// two passes over the contact planes, 32-bit surface.
+    Fast,
+    /// converged contact planes, interface nodes free near the contact.
+    Balanced,
+    /// one order higher, everything converged and free.
+    Exact,
+}
+
+/// Which interface nodes are free.
+#[derive(Debug)]
+pub(in crate::scene) enum AdaptiveRaw {
+    Off,
+    Radius(f64),
+    Keys(AdaptiveKeys),
+}
+
+/// The p-method in full.
+#[derive(Debug, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(in crate::scene) struct AdaptiveKeys {
+    pub(in crate::scene) method: Option<MethodRaw>,
+    pub(in crate::scene) radius: Option<At<f64>>,
+    pub(in crate::scene) indicator: Option<At<f64>>,
+    pub(in crate::scene) budget_us: Option<At<f64>>,
+}
+
+/// How constrained interface nodes follow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(in crate::scene) enum MethodRaw {
+    Select,
+    Constrain,
+}
+
+impl<'de> Deserialize<'de> for AdaptiveRaw {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Choice;
+        impl<'de> Visitor<'de> for Choice {
+            type Value = AdaptiveRaw;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("\"off\", a radius, or a table with radius, indicator or budget_us")
+            }
+            fn visit_str<E: de::Error>(self, word: &str) -> Result<AdaptiveRaw, E> {
+                match word {
+                    "off" => Ok(AdaptiveRaw::Off),
+                    _ => Err(E::unknown_variant(word, &["off"])),
+                }
+            }
+            fn visit_f64<E: de::Error>(self, radius: f64) -> Result<AdaptiveRaw, E> {
+                Ok(AdaptiveRaw::Radius(radius))
+            }
+            fn visit_i64<E: de::Error>(self, radius: i64) -> Result<AdaptiveRaw, E> {
+                Ok(AdaptiveRaw::Radius(radius as f64))
+            }
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<AdaptiveRaw, A::Error> {
+                AdaptiveKeys::deserialize(MapAccessDeserializer::new(map)).map(AdaptiveRaw::Keys)
+            }
+        }
+        deserializer.deserialize_any(Choice)
+    }
+}
+
+impl JsonSchema for AdaptiveRaw {
+    fn inline_schema() -> bool {
+        true
+    }
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Adaptive".into()
+    }
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "x-type": "`\"off\"`, number or table",
+            "anyOf": [
+                { "const": "off" },
+                { "type": "number", "minimum": 0 },
+                {
+                    "type": "object",
+                    "properties": {
+                        "method": { "enum": ["select", "constrain"] },
+                        "radius": { "type": "number", "minimum": 0 },
+                        "indicator": { "type": "number", "exclusiveMinimum": 0 },
+                        "budget_us": { "type": "number", "exclusiveMinimum": 0 }
+                    },
+                    "additionalProperties": false
+                }
+            ]
+        })
+    }
+}
+
+/// The keys, or one word for all of them.
+#[derive(Debug, Default)]
+pub(in crate::scene) struct AccuracyRaw(pub(in crate::scene) AccuracyKeys);
+
+impl<'de> Deserialize<'de> for AccuracyRaw {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Choice;
+        impl<'de> Visitor<'de> for Choice {
+            type Value = AccuracyKeys;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("\"fast\", \"balanced\", \"exact\" or a section [accuracy]")
+            }
+            fn visit_str<E: de::Error>(self, word: &str) -> Result<AccuracyKeys, E> {
+                let preset = match word {
+                    "fast" => PresetRaw::Fast,
+                    "balanced" => PresetRaw::Balanced,
+                    "exact" => PresetRaw::Exact,
+                    _ => return Err(E::unknown_variant(word, &["fast", "balanced", "exact"])),
+                };
+                Ok(AccuracyKeys {
+                    preset: Some(preset),
+                    ..AccuracyKeys::default()
+                })
+            }
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<AccuracyKeys, A::Error> {
+                AccuracyKeys::deserialize(MapAccessDeserializer::new(map))
+            }
+        }
+        deserializer.deserialize_any(Choice).map(Self)
+    }
+}
+
+impl JsonSchema for AccuracyRaw {
+    fn inline_schema() -> bool {
+        true
+    }
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Accuracy".into()
+    }
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let mut schema = AccuracyKeys::json_schema(generator);
+        // A word is allowed too; `properties` does not look at words, nor `pattern` at tables.
+        schema.insert("type".to_owned(), serde_json::json!(["object", "string"]));
+        schema.insert("pattern".to_owned(), "^(fast|balanced|exact)$".into());
+        schema
+    }
+}
+
+#[derive(Debug, Default, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(in crate::scene) struct AccuracyKeys {
+    /// Settings for a goal; keys that are written beside it take precedence.
+    #[schemars(extend("x-default" = "none"))]
+    pub(in crate::scene) preset: Option<PresetRaw>,
+    /// Time that 99.9 % of the steps may take, in microseconds whatever the units: the most
+    /// accurate settings that keep it on this machine are measured, chosen and named. Stands alone.
+    #[schemars(extend("x-type" = "number", "x-default" = "none"))]
+    pub(in crate::scene) budget_us: Option<At<f64>>,
+    /// Order of the elements, 1, 2 or 3; raised or lowered from the mesh's own.
+    #[schemars(range(min = 1, max = 3), extend("x-default" = "the mesh's own"))]
+    pub(in crate::scene) order: Option<At<i64>>,
+    /// The p-method: which interface nodes (those on edges and faces) are free; the others follow
+    /// their principal nodes (the elements' vertices). `"off"`: all are free. A number: those within
+    /// this radius of the contact. A table: `radius`, or `indicator` (free where the edge bends by
+    /// more than this share of the largest displacement), or `budget_us` (as many as this time
+    /// allows, nearest first); and `method`: `"select"` (forces are those of the full order,
+    /// only the drawn shape is interpolated) or `"constrain"` (a stiffer part: Galerkin's method on
+    /// the free nodes, for comparison). Example: `{ method = "constrain", radius = 3.0 }`.
+    #[schemars(extend("x-quantity" = "length", "default" = "off"))]
+    pub(in crate::scene) adaptive: Option<At<AdaptiveRaw>>,
+    /// Other meshes of the same part with the same groups, relative to the scene file: an axis of
+    /// `snapin accuracy`.
+    #[schemars(extend("x-default" = "none"))]
+    pub(in crate::scene) meshes: Option<Vec<At<String>>>,
+    /// How often contact planes are put on anew at the new positions within one step: until the
+    /// displacement no longer changes, or 1 to 50 times.
+    #[schemars(extend("default" = "converged"))]
+    pub(in crate::scene) contact_iterations: Option<At<IterationsRaw>>,
+    /// Nodes nearer to the tool than this get a contact plane, above 0.
+    #[schemars(extend("x-quantity" = "length", "x-default" = "chosen from the tool's motion"))]
+    pub(in crate::scene) near_distance: Option<At<f64>>,
+    /// Largest residual of the contact solution, scaled by its largest terms, 1e-15 to 1e-2;
+    /// what is beyond it is reported.
+    #[schemars(extend("x-quantity" = "number", "default" = default::LCP_TOLERANCE))]
+    pub(in crate::scene) lcp_tolerance: Option<At<f64>>,
+    /// Contact planes in one step, 1 to 5000; beyond it the deepest are kept and the rest is
+    /// counted and reported.
+    #[schemars(range(min = 1, max = 5000), extend("default" = default::MAX_CONTACTS))]
+    pub(in crate::scene) max_contacts: Option<At<i64>>,
+    /// Number type of the displacement multiply; forces are always computed in f64.
+    #[schemars(extend("default" = "f64"))]
+    pub(in crate::scene) scalar: Option<At<ScalarRaw>>,
+    /// Where the displacement multiply runs.
+    #[schemars(extend("default" = "auto"))]
+    pub(in crate::scene) multiply: Option<At<MultiplyRaw>>,
+}

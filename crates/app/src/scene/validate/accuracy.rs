@@ -1,0 +1,190 @@
+//! `[accuracy]`: presets resolved, ranges checked, SI.
+
+use super::super::raw::{
+    AccuracyKeys, AdaptiveKeys, AdaptiveRaw, At, IterationsRaw, MethodRaw, MultiplyRaw, PresetRaw,
+    ScalarRaw, default,
+};
+use super::super::units::Quantity;
+use super::super::{
+    Accuracy, Adaptive, ContactIterations, FreeNodes, Multiply, PMethod, Preset, Scalar, SceneError,
+};
+use super::{Check, Range};
+
+impl Check<'_> {
+    pub(super) fn accuracy(&self, raw: &AccuracyKeys) -> Result<Accuracy, SceneError> {
+        self.refuse_mixed_budget(raw)?;
+        if let Some(at) = raw
+            .multiply
+            .as_ref()
+            .filter(|at| at.value == MultiplyRaw::Gpu)
+        {
+            let what = "multiply \"gpu\" is not in this version".to_owned();
+            return Err(self.error(at.offset, what, "use \"auto\" or \"cpu\""));
+        }
+        let preset = raw.preset.map(|preset| match preset {
+            PresetRaw::Fast => Preset::Fast,
+            PresetRaw::Balanced => Preset::Balanced,
+            PresetRaw::Exact => Preset::Exact,
+        });
+        let base = Accuracy::of(preset);
+        let near = raw.near_distance.as_ref();
+        let near_distance = near
+            .map(|at| self.number("near_distance", at, Quantity::Length, Range::Positive))
+            .transpose()?;
+        let most = raw.max_contacts.as_ref();
+        let max_contacts = most.map_or(Ok(default::MAX_CONTACTS), |at| {
+            self.integer("max_contacts", at, 1, 5000)
+        })?;
+        let mend = "paths are relative to the scene file";
+        let meshes = raw.meshes.iter().flatten();
+        Ok(Accuracy {
+            preset,
+            budget_us: match &raw.budget_us {
+                Some(at) => Some(self.micros("budget_us", at)?),
+                None => None,
+            },
+            adaptive: match &raw.adaptive {
+                Some(at) => self.adaptive(at)?,
+                None => base.adaptive,
+            },
+            contact_iterations: match &raw.contact_iterations {
+                Some(at) => self.iterations(at)?,
+                None => base.contact_iterations,
+            },
+            near_distance,
+            lcp_tolerance: match &raw.lcp_tolerance {
+                Some(at) => self.lcp_tolerance(at)?,
+                None => base.lcp_tolerance,
+            },
+            max_contacts: max_contacts as usize,
+            scalar: match raw.scalar.as_ref().map(|at| at.value) {
+                Some(ScalarRaw::F32) => Scalar::F32,
+                Some(ScalarRaw::F64) => Scalar::F64,
+                None => base.scalar,
+            },
+            multiply: match raw.multiply.as_ref().map(|at| at.value) {
+                Some(MultiplyRaw::Cpu) => Multiply::Cpu,
+                _ => Multiply::Auto,
+            },
+            meshes: meshes
+                .map(|at| self.file("accuracy.meshes", at, mend))
+                .collect::<Result<_, _>>()?,
+        })
+    }
+
+    /// Order of the elements: of `accuracy.order`, `part.order` or the preset.
+    pub(super) fn order(
+        &self,
+        of_accuracy: Option<&At<i64>>,
+        of_part: Option<&At<i64>>,
+        preset: Option<PresetRaw>,
+    ) -> Result<Option<u8>, SceneError> {
+        let read = |at: &At<i64>| self.integer("order", at, 1, 3).map(|order| order as u8);
+        let (of_accuracy, place) = (of_accuracy.map(read).transpose()?, of_accuracy);
+        let of_part = of_part.map(read).transpose()?;
+        match (of_accuracy, of_part, place) {
+            (Some(a), Some(p), Some(at)) if a != p => {
+                let what = format!("accuracy.order {a} and part.order {p} differ");
+                Err(self.error(at.offset, what, "leave one of the two out"))
+            }
+            (Some(order), ..) | (None, Some(order), _) => Ok(Some(order)),
+            (None, None, _) => Ok((preset == Some(PresetRaw::Exact)).then_some(3)),
+        }
+    }
+
+    /// A budget chooses settings itself, so others beside it would be ignored.
+    fn refuse_mixed_budget(&self, raw: &AccuracyKeys) -> Result<(), SceneError> {
+        let Some(budget) = &raw.budget_us else {
+            return Ok(());
+        };
+        let beside = [
+            ("preset", raw.preset.is_some()),
+            ("order", raw.order.is_some()),
+            ("adaptive", raw.adaptive.is_some()),
+            ("contact_iterations", raw.contact_iterations.is_some()),
+            ("lcp_tolerance", raw.lcp_tolerance.is_some()),
+            ("scalar", raw.scalar.is_some()),
+        ];
+        match beside.into_iter().find(|(_, is_there)| *is_there) {
+            Some((key, _)) => Err(self.error(
+                budget.offset,
+                format!("budget_us chooses {key} itself, but {key} is written too"),
+                format!("leave out budget_us or {key}"),
+            )),
+            None => Ok(()),
+        }
+    }
+
+    fn micros(&self, key: &str, at: &At<f64>) -> Result<f64, SceneError> {
+        self.number(key, at, Quantity::Number, Range::Positive)
+    }
+
+    fn iterations(&self, at: &At<IterationsRaw>) -> Result<ContactIterations, SceneError> {
+        match at.value {
+            IterationsRaw::Converged => Ok(ContactIterations::Converged),
+            IterationsRaw::Times(value) => {
+                let offset = at.offset;
+                let times =
+                    self.integer("contact_iterations", &At { value, offset }, 1, 50)? as u32;
+                Ok(ContactIterations::Times(times))
+            }
+        }
+    }
+
+    fn lcp_tolerance(&self, at: &At<f64>) -> Result<f64, SceneError> {
+        let value = self.number("lcp_tolerance", at, Quantity::Number, Range::Positive)?;
+        if !(1e-15..=1e-2).contains(&value) {
+            let what = format!("lcp_tolerance {value:e} is not between 1e-15 and 1e-2");
+            return Err(self.error(at.offset, what, "1e-10 is safe with 64-bit numbers"));
+        }
+        Ok(value)
+    }
+
+    fn adaptive(&self, at: &At<AdaptiveRaw>) -> Result<Adaptive, SceneError> {
+        match &at.value {
+            AdaptiveRaw::Off => Ok(Adaptive::Off),
+            AdaptiveRaw::Radius(value) => {
+                let (value, offset) = (*value, at.offset);
+                let radius = At { value, offset };
+                Ok(Adaptive::On {
+                    method: PMethod::Select,
+                    free: FreeNodes::Radius(self.radius(&radius)?),
+                })
+            }
+            AdaptiveRaw::Keys(keys) => self.adaptive_keys(keys, at.offset),
+        }
+    }
+
+    fn adaptive_keys(&self, keys: &AdaptiveKeys, offset: usize) -> Result<Adaptive, SceneError> {
+        let free = match (&keys.radius, &keys.indicator, &keys.budget_us) {
+            (Some(at), None, None) => FreeNodes::Radius(self.radius(at)?),
+            (None, Some(at), None) => FreeNodes::Indicator(self.number(
+                "adaptive.indicator",
+                at,
+                Quantity::Number,
+                Range::Positive,
+            )?),
+            (None, None, Some(at)) => FreeNodes::BudgetUs(self.micros("adaptive.budget_us", at)?),
+            (None, None, None) => {
+                let what = "adaptive says nothing of which nodes are free".to_owned();
+                return Err(self.error(offset, what, "write radius, indicator or budget_us"));
+            }
+            _ => {
+                let what = "adaptive says more than once which nodes are free".to_owned();
+                let mend = "keep one of radius, indicator and budget_us";
+                return Err(self.error(offset, what, mend));
+            }
+        };
+        Ok(Adaptive::On {
+            method: match keys.method {
+                Some(MethodRaw::Constrain) => PMethod::Constrain,
+                Some(MethodRaw::Select) | None => PMethod::Select,
+            },
+            free,
+        })
+    }
+
+    fn radius(&self, at: &At<f64>) -> Result<f64, SceneError> {
+        self.number("adaptive radius", at, Quantity::Length, Range::NotNegative)
+    }
+}

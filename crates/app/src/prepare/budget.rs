@@ -119,6 +119,7 @@ mod tests {
                 .join("../../scenes/clip.msh"),
             length_scale: 1.0,
             order: Some(2),
+            refinements: 0,
             material: Material::new(2.7e9, 0.35).unwrap(),
             fixed: vec![(group("fixed"), [true; 3])],
             contact: vec![group("contact")],

@@ -7,9 +7,11 @@
 //!
 //! Everything here is in the part's frame; the session converts from and to the world.
 
+mod constrained;
 mod part;
 mod report;
 mod scratch;
+mod switch;
 mod watch_list;
 
 use std::sync::Arc;
@@ -23,9 +25,13 @@ use device::VirtualCoupling;
 use glam::DVec3;
 use glamx::DPose3;
 
+use constrained::Constrained;
+pub use constrained::{BubbleData, FreeSettings};
 pub use part::ContactPart;
+use part::{Bubbles, Deformed};
 pub use report::{ActiveContact, N_STAGES, Stage, StepReport};
 use scratch::Scratch;
+pub use switch::switch_bound;
 use watch_list::{State, WatchList};
 
 /// How often the contact planes are drawn anew within one step.
@@ -83,6 +89,10 @@ pub struct Engine {
     last_target: Option<DPose3>,
     /// Deviation of the tool from its target: position (m) and rotation vector (rad).
     deviation: [f64; 6],
+    /// On the tool, from the contacts, at the end of the last step.
+    last_wrench: [f64; 6],
+    /// The p-method by Galerkin, where the scene asks for it.
+    constrained: Option<Box<Constrained>>,
 }
 
 impl Engine {
@@ -113,9 +123,39 @@ impl Engine {
             scratch,
             last_target: None,
             deviation: [0.0; 6],
+            last_wrench: [0.0; 6],
+            constrained: None,
             part,
             tool,
         })
+    }
+
+    /// An engine whose part has constrained interface nodes, some of which are freed on the way.
+    ///
+    /// `rest`, `n_rows`, `coarse`: as for [`ContactPart::new`], the compliance with all interface nodes
+    /// constrained. `bubbles`: what freeing them adds.
+    ///
+    /// # Errors
+    /// As [`Engine::new`].
+    pub fn constrained(
+        part: ContactPart,
+        bubbles: BubbleData,
+        free: FreeSettings,
+        tool: Tool,
+        coupling: Option<VirtualCoupling>,
+        settings: EngineSettings,
+    ) -> Result<Self, contact::Error> {
+        let part = Arc::new(part.bounded_by(&bubbles.bounds));
+        let mut engine = Self::new(part, tool, coupling, settings)?;
+        let n_candidates = engine.part.n_candidates();
+        let max_rows = engine.scratch.max_rows();
+        engine.constrained = Some(Box::new(Constrained::new(
+            bubbles,
+            free,
+            n_candidates,
+            max_rows,
+        )));
+        Ok(engine)
     }
 
     /// The part that steps act on.
@@ -134,6 +174,10 @@ impl Engine {
         self.watch_list.forget();
         self.last_target = None;
         self.deviation = [0.0; 6];
+        self.last_wrench = [0.0; 6];
+        if let Some(constrained) = &mut self.constrained {
+            constrained.reset();
+        }
     }
 
     /// Contacts that carry force after the last step.
@@ -143,7 +187,13 @@ impl Engine {
 
     /// Displacement of candidate `candidate_idx` under the contact forces of the last step, m.
     pub fn displacement(&self, candidate_idx: usize) -> DVec3 {
-        self.part.displacement(candidate_idx, &self.scratch.active)
+        deformed(&self.part, &self.scratch, &self.constrained).displacement(candidate_idx)
+    }
+
+    /// Bubbles that are added to the compliance's displacement in the last state, and their forces
+    /// (N); empty where no interface node is constrained.
+    pub fn bubble_forces(&self) -> &[(u32, DVec3)] {
+        bubbles_of(&self.constrained).terms
     }
 
     /// One step. `target`: pose of the tool that the handle asks for, in the part's frame.
@@ -160,6 +210,7 @@ impl Engine {
             report.tool_pose = self.last_target.unwrap_or(DPose3::IDENTITY);
             return report;
         }
+        self.switch_free_nodes(&mut report);
         let from = self.last_target.unwrap_or(*target);
         let motion = (target.translation - from.translation).length()
             + self.reach_of_rotation * from.rotation.angle_between(target.rotation);
@@ -180,6 +231,7 @@ impl Engine {
             self.solve_at(&waypoint, &mut report);
         }
         self.last_target = Some(*target);
+        self.last_wrench = report.contact_wrench_on_tool;
         report
     }
 
@@ -221,13 +273,19 @@ impl Engine {
         let tool = &self.tool;
         let pose = *tool_pose;
         let near_distance = self.settings.near_distance;
+        let bubbles = bubbles_of(&self.constrained);
         let planes_of = |candidates: &[u32],
                          active: &[ActiveContact],
                          max_gap: f64,
                          planes: &mut Vec<Plane>| {
+            let deformed = Deformed {
+                part,
+                active,
+                bubbles,
+            };
             let position_of = |candidate: u32| {
                 let i = candidate as usize;
-                part.rest_positions()[i] + part.displacement(i, active)
+                part.rest_positions()[i] + deformed.displacement(i)
             };
             planes_into(tool, &pose, candidates, position_of, max_gap, planes)
         };
@@ -240,10 +298,13 @@ impl Engine {
             ..
         } = &mut self.scratch;
         let state = State {
-            part,
+            deformed: Deformed {
+                part,
+                active,
+                bubbles,
+            },
             tool,
             tool_pose,
-            active,
             is_active: was_active,
         };
         let candidates = self.watch_list.update(state, near_distance);
@@ -292,6 +353,10 @@ impl Engine {
                 .map(|matrix| CouplingCompliance { matrix, reference });
             let assembled = delassus_into(part, planes, coupling, &mut w_matrix[..m * m]);
             debug_assert!(assembled.is_ok(), "the matrix has the size of the planes");
+            if let Some(constrained) = &mut self.constrained {
+                constrained.ensure(planes);
+                constrained.add_to_delassus(planes, &mut w_matrix[..m * m]);
+            }
         }
         clock.lap(Stage::Delassus, report);
 
@@ -305,6 +370,9 @@ impl Engine {
 
         // Forces of the near nodes become the state; the tool goes where its coupling balances.
         self.scratch.adopt_forces(m);
+        if let Some(constrained) = &mut self.constrained {
+            constrained.adopt_forces(&self.scratch.active);
+        }
         let (force, torque) = wrench_on_tool(&self.scratch.planes, &self.scratch.z[..m], reference);
         report.contact_wrench_on_tool = [force.x, force.y, force.z, torque.x, torque.y, torque.z];
         if let Some(compliance) = &self.coupling_compliance {
@@ -319,10 +387,9 @@ impl Engine {
         let mut change = (moved.translation - tool_pose.translation).length()
             + self.reach_of_rotation * moved.rotation.angle_between(tool_pose.rotation);
         *tool_pose = moved;
+        let deformed = deformed(&self.part, &self.scratch, &self.constrained);
         for (plane, before) in self.scratch.planes.iter().zip(&self.scratch.u_before) {
-            let u = self
-                .part
-                .displacement(plane.candidate as usize, &self.scratch.active);
+            let u = deformed.displacement(plane.candidate as usize);
             change = change.max((u - *before).length());
         }
         clock.lap(Stage::Update, report);
@@ -339,6 +406,24 @@ impl Engine {
             // An imposed pose carries whatever the contact asks for.
             None => report.contact_wrench_on_tool.map(|x| -x),
         };
+    }
+}
+
+fn bubbles_of(constrained: &Option<Box<Constrained>>) -> Bubbles<'_> {
+    constrained
+        .as_ref()
+        .map_or(Bubbles::default(), |constrained| constrained.bubbles())
+}
+
+fn deformed<'a>(
+    part: &'a ContactPart,
+    scratch: &'a Scratch,
+    constrained: &'a Option<Box<Constrained>>,
+) -> Deformed<'a> {
+    Deformed {
+        part,
+        active: &scratch.active,
+        bubbles: bubbles_of(constrained),
     }
 }
 

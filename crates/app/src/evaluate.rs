@@ -346,7 +346,10 @@ fn paper(rows: &[StepRow]) -> Vec<PaperStage> {
         |row: &StepRow, stages: &[Stage]| stages.iter().map(|s| row.stage_ns[*s as usize]).sum();
     PaperStage::duriez_2004(
         median(&|r| Some(of(r, &[Stage::Proximity, Stage::Planes]))),
-        median(&|r| Some(of(r, &[Stage::Delassus, Stage::Lcp, Stage::Update]))),
+        median(&|r| {
+            let response = [Stage::Delassus, Stage::Lcp, Stage::Update, Stage::FreeNodes];
+            Some(of(r, &response))
+        }),
         median(&|r| r.multiply_ns),
     )
 }

@@ -13,6 +13,7 @@ pub mod engine;
 mod error;
 mod evaluate;
 pub mod fields;
+mod free_nodes;
 pub mod interrupt;
 pub mod machine;
 mod output;

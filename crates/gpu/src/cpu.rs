@@ -121,6 +121,45 @@ impl<T: Stored> Multiply for Cpu<T> {
         forces: &[f64],
         displacement: &mut [f64],
     ) -> Result<(), Error> {
+        self.check(columns, forces, displacement)?;
+        self.add_first(columns, forces, displacement);
+        Ok(())
+    }
+
+    fn multiply_rows_into(
+        &mut self,
+        columns: &[u32],
+        forces: &[f64],
+        n_first: usize,
+        rows: &[u32],
+        displacement: &mut [f64],
+    ) -> Result<(), Error> {
+        self.check(columns, forces, displacement)?;
+        let n_rows = self.layout.n_rows();
+        let largest = rows.iter().map(|r| *r as usize + 1).max().unwrap_or(0);
+        if n_first.max(largest) > n_rows {
+            let row = n_first.max(largest) - 1;
+            return Err(Error::NoSuchRow { row, n_rows });
+        }
+        self.add_first(columns, forces, &mut displacement[..3 * n_first]);
+        for &row in rows {
+            let at = 3 * row as usize;
+            let mut u = [0.0; 3];
+            for (&candidate, f) in columns.iter().zip(forces.chunks_exact(3)) {
+                for (column, f) in self.columns_of(candidate).into_iter().zip(f) {
+                    for (u, c) in u.iter_mut().zip(&column[at..at + 3]) {
+                        *u += c.to_f64() * (f * self.unit);
+                    }
+                }
+            }
+            displacement[at..at + 3].copy_from_slice(&u);
+        }
+        Ok(())
+    }
+}
+
+impl<T: Stored> Cpu<T> {
+    fn check(&self, columns: &[u32], forces: &[f64], displacement: &[f64]) -> Result<(), Error> {
         check_length("forces", forces.len(), 3 * columns.len())?;
         check_length(
             "displacement",
@@ -128,13 +167,17 @@ impl<T: Stored> Multiply for Cpu<T> {
             self.layout.displacement_len(),
         )?;
         let n_candidates = self.layout.n_candidates();
-        if let Some(&column) = columns.iter().find(|&&c| c as usize >= n_candidates) {
-            return Err(Error::NoSuchColumn {
+        match columns.iter().find(|&&c| c as usize >= n_candidates) {
+            Some(&column) => Err(Error::NoSuchColumn {
                 column,
                 n_candidates,
-            });
+            }),
+            None => Ok(()),
         }
+    }
 
+    /// Displacement of the first rows, as many as `displacement` holds.
+    fn add_first(&self, columns: &[u32], forces: &[f64], displacement: &mut [f64]) {
         // Two candidates at a time: six columns for one load and store of the sums, which stay in the
         // cache, so that only the compliance is read from memory. Cutting the columns into tiles of
         // 8 to 32 KB of sums gained nothing.
@@ -151,7 +194,6 @@ impl<T: Stored> Multiply for Cpu<T> {
             let f = [x, y, z].map(|f| f * self.unit);
             add_three(displacement, self.columns_of(candidate), f);
         }
-        Ok(())
     }
 }
 
@@ -200,6 +242,34 @@ fn power_of_two_below(value: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn some_rows_are_those_of_the_whole_and_the_others_stay() {
+        let layout = Layout::new(7, 4).unwrap();
+        let mut numbers = Numbers(5);
+        let blocks = numbers.take(layout.n_scalars());
+        let forces = numbers.take(9);
+        for scalar in [Scalar::F32, Scalar::F64] {
+            let mut multiply = on_cpu(layout, &blocks, scalar).unwrap();
+            let (mut whole, mut some) = ([0.0; 21], [7.0; 21]);
+            multiply
+                .multiply_into(&[3, 0, 2], &forces, &mut whole)
+                .unwrap();
+            multiply
+                .multiply_rows_into(&[3, 0, 2], &forces, 2, &[6, 4], &mut some)
+                .unwrap();
+            for (i, (a, b)) in some.iter().zip(whole).enumerate() {
+                match i / 3 {
+                    0 | 1 | 4 | 6 => assert!((a - b).abs() < 1e-15, "{i}"),
+                    _ => assert_eq!(*a, 7.0),
+                }
+            }
+            for (n_first, row) in [(8, 3), (1, 7)] {
+                let refused = multiply.multiply_rows_into(&[], &[], n_first, &[row], &mut some);
+                assert_eq!(refused, Err(Error::NoSuchRow { row: 7, n_rows: 7 }));
+            }
+        }
+    }
 
     /// Numbers in [-1, 1) from a fixed seed (linear congruence of Knuth's MMIX).
     struct Numbers(u64);

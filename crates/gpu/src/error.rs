@@ -24,6 +24,14 @@ pub enum Error {
         /// Number of candidates.
         n_candidates: usize,
     },
+    /// A row that the surface does not have.
+    #[error("row {row} is not among the {n_rows} rows of the surface")]
+    NoSuchRow {
+        /// The row asked for.
+        row: usize,
+        /// Rows of the surface.
+        n_rows: usize,
+    },
     /// The compliance holds a number that is not finite.
     #[error("the compliance of row {row} for candidate {candidate} is not finite")]
     NotFinite {

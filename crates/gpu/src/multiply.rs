@@ -42,4 +42,21 @@ pub trait Multiply: Send {
         forces: &[f64],
         displacement: &mut [f64],
     ) -> Result<(), Error>;
+
+    /// Displacement of some rows: the first `n_first` and those listed.
+    ///
+    /// As [`multiply_into`](Self::multiply_into) for these rows; the others are left as they are. The
+    /// first rows are read in order, a listed one costs about three times as much as one of them.
+    /// `rows`: at or above `n_first`, each once.
+    ///
+    /// # Errors
+    /// As [`multiply_into`](Self::multiply_into), and where a row does not exist.
+    fn multiply_rows_into(
+        &mut self,
+        columns: &[u32],
+        forces: &[f64],
+        n_first: usize,
+        rows: &[u32],
+        displacement: &mut [f64],
+    ) -> Result<(), Error>;
 }

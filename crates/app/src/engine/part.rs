@@ -12,7 +12,7 @@ pub struct ContactPart {
     rest: Vec<DVec3>,
     n_rows: usize,
     blocks: Vec<f64>,
-    /// m/N, by candidate j: largest Frobenius norm of C_ij over all candidates i.
+    /// m/N, by candidate j: bound on the norm of C_ij for all candidates i.
     largest_block: Vec<f64>,
 }
 
@@ -42,6 +42,18 @@ impl ContactPart {
             blocks,
             largest_block,
         }
+    }
+
+    /// Takes other bounds on the norms of the blocks, m/N by candidate: those of a compliance that
+    /// this one is only a share of.
+    pub(super) fn bounded_by(mut self, bounds: &[f64]) -> Self {
+        assert_eq!(
+            bounds.len(),
+            self.rest.len(),
+            "one bound for each candidate"
+        );
+        self.largest_block.copy_from_slice(bounds);
+        self
     }
 
     /// Number of candidate nodes.
@@ -81,6 +93,45 @@ impl ContactPart {
             .iter()
             .map(|c| self.largest_block[c.candidate as usize] * c.normal_force.abs())
             .sum()
+    }
+}
+
+/// The part under contact forces: what every stage asks for displacements.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Deformed<'a> {
+    pub(super) part: &'a ContactPart,
+    pub(super) active: &'a [ActiveContact],
+    /// Displacement per bubble of each candidate, and the bubbles that are not zero; empty without
+    /// the constrained p-method.
+    pub(super) bubbles: Bubbles<'a>,
+}
+
+/// Bubbles that are added to the displacement of [`ContactPart`].
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Bubbles<'a> {
+    /// Block of candidate i and bubble j at `i n_bubbles + j`.
+    pub(super) coupling: &'a [DMat3],
+    pub(super) n_bubbles: usize,
+    /// Bubble and its force (N).
+    pub(super) terms: &'a [(u32, DVec3)],
+    /// Full switches of the operator since the start, each no more than the whole compliance.
+    pub(super) switched: f64,
+}
+
+impl Deformed<'_> {
+    /// Displacement of candidate `i`, m.
+    #[inline]
+    pub(super) fn displacement(&self, i: usize) -> DVec3 {
+        let mut u = self.part.displacement(i, self.active);
+        for &(bubble, force) in self.bubbles.terms {
+            u += self.bubbles.coupling[i * self.bubbles.n_bubbles + bubble as usize] * force;
+        }
+        u
+    }
+
+    /// Upper bound on the displacement of any candidate, m.
+    pub(super) fn displacement_bound(&self) -> f64 {
+        self.part.displacement_bound(self.active)
     }
 }
 

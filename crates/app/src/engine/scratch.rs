@@ -32,6 +32,10 @@ pub(super) struct Scratch {
     /// Contacts that carry force: the state between passes and steps.
     pub(super) active: Vec<ActiveContact>,
     lcp: lcp::Scratch,
+    /// Contacts set aside while another operator is tried.
+    saved: Vec<ActiveContact>,
+    /// Rest positions of what is in contact, for the choice of free nodes, m.
+    pub(super) centres: Vec<DVec3>,
 }
 
 impl Scratch {
@@ -56,7 +60,32 @@ impl Scratch {
             was_active: vec![false; n_candidates],
             active: Vec::with_capacity(rows),
             lcp: lcp::Scratch::new(rows),
+            saved: Vec::with_capacity(rows),
+            centres: Vec::with_capacity(n_candidates),
             planes,
+        }
+    }
+
+    /// Rows of the LCP that there is memory for.
+    pub(super) fn max_rows(&self) -> usize {
+        self.q.len()
+    }
+
+    /// Sets the contacts aside.
+    pub(super) fn save_contacts(&mut self) {
+        self.saved.clear();
+        self.saved.extend_from_slice(&self.active);
+    }
+
+    /// Takes the contacts back that were set aside.
+    pub(super) fn restore_contacts(&mut self) {
+        for contact in &self.active {
+            self.was_active[contact.candidate as usize] = false;
+        }
+        self.active.clear();
+        self.active.extend_from_slice(&self.saved);
+        for contact in &self.active {
+            self.was_active[contact.candidate as usize] = true;
         }
     }
 

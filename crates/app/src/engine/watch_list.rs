@@ -16,7 +16,8 @@ use contact::tool::Tool;
 use glam::DVec3;
 use glamx::DPose3;
 
-use super::{ActiveContact, ContactPart};
+use super::ContactPart;
+use super::part::Deformed;
 
 /// Slack of the narrow list over that of the wide one.
 const NARROW_SHARE: f64 = 0.1;
@@ -32,10 +33,9 @@ pub(super) struct WatchList {
 /// What a list is judged by: the state of now.
 #[derive(Clone, Copy)]
 pub(super) struct State<'a> {
-    pub(super) part: &'a ContactPart,
+    pub(super) deformed: Deformed<'a>,
     pub(super) tool: &'a Tool,
     pub(super) tool_pose: &'a DPose3,
-    pub(super) active: &'a [ActiveContact],
     /// By candidate: carries force.
     pub(super) is_active: &'a [bool],
 }
@@ -54,6 +54,11 @@ impl WatchList {
         })
     }
 
+    /// Candidates of the last [`Self::update`].
+    pub(super) fn watched(&self) -> &[u32] {
+        &self.narrow.watched
+    }
+
     /// Makes the next [`Self::update`] look anew.
     pub(super) fn forget(&mut self) {
         self.wide.pose = None;
@@ -67,7 +72,7 @@ impl WatchList {
             let narrow_reach = reach + self.narrow.slack;
             if self.wide.is_stale(state) {
                 let wide_reach = narrow_reach + self.wide.slack;
-                let inflate = wide_reach + state.part.displacement_bound(state.active);
+                let inflate = wide_reach + state.deformed.displacement_bound();
                 self.tree
                     .near_into(state.tool, state.tool_pose, inflate, &mut self.found);
                 self.wide.make(state, &self.found, wide_reach);
@@ -86,6 +91,7 @@ struct List {
     /// By candidate: force when the list was made, N.
     force_then: Vec<DVec3>,
     active_then: Vec<u32>,
+    switched_then: f64,
     slack: f64,
     centre: DVec3,
     radius: f64,
@@ -100,6 +106,7 @@ impl List {
             pose: None,
             force_then: vec![DVec3::ZERO; rest.len()],
             active_then: Vec::with_capacity(rest.len()),
+            switched_then: 0.0,
             slack,
             centre,
             radius: rest
@@ -127,28 +134,42 @@ impl List {
         }
         let lever = (now.translation - self.centre).length()
             + self.radius
-            + state.part.displacement_bound(state.active)
+            + state.deformed.displacement_bound()
             + self.slack;
         shift + turn * lever
     }
 
     /// Bound on the change of any candidate's displacement since the list was made, m.
     fn change_bound(&self, state: State<'_>) -> f64 {
-        let changed: f64 = state
-            .active
+        let Deformed {
+            part,
+            active,
+            bubbles,
+        } = state.deformed;
+        let changed: f64 = active
             .iter()
             .map(|c| {
                 let then = self.force_then[c.candidate as usize];
-                state.part.largest_block(c.candidate) * (c.force_on_part - then).length()
+                part.largest_block(c.candidate) * (c.force_on_part - then).length()
             })
             .sum();
         let gone: f64 = self
             .active_then
             .iter()
             .filter(|c| !state.is_active[**c as usize])
-            .map(|c| state.part.largest_block(*c) * self.force_then[*c as usize].length())
+            .map(|c| part.largest_block(*c) * self.force_then[*c as usize].length())
             .sum();
-        changed + gone
+        // The compliance itself changes by no more than all of it while free nodes are switched.
+        let switched = (bubbles.switched - self.switched_then).min(1.0);
+        let by_switch: f64 = if switched > 0.0 {
+            let then = self.active_then.iter();
+            then.map(|c| part.largest_block(*c) * self.force_then[*c as usize].length())
+                .sum::<f64>()
+                * switched
+        } else {
+            0.0
+        };
+        changed + gone + by_switch
     }
 
     /// Keeps those of `from` that are nearer than `reach` now.
@@ -156,8 +177,7 @@ impl List {
         self.watched.clear();
         for &candidate in from {
             let i = candidate as usize;
-            let position =
-                state.part.rest_positions()[i] + state.part.displacement(i, state.active);
+            let position = state.deformed.part.rest_positions()[i] + state.deformed.displacement(i);
             // A position that is not finite stays on the list, to be counted where planes are made.
             let distance = state.tool.signed_distance(state.tool_pose, position);
             let is_far = distance.signed_distance > reach;
@@ -168,11 +188,12 @@ impl List {
         for candidate in self.active_then.drain(..) {
             self.force_then[candidate as usize] = DVec3::ZERO;
         }
-        for contact in state.active {
+        for contact in state.deformed.active {
             self.force_then[contact.candidate as usize] = contact.force_on_part;
             self.active_then.push(contact.candidate);
         }
         self.pose = Some(*state.tool_pose);
+        self.switched_then = state.deformed.bubbles.switched;
     }
 }
 
@@ -180,6 +201,8 @@ impl List {
 mod tests {
     use contact::tool::Sphere;
 
+    use super::super::ActiveContact;
+    use super::super::part::Bubbles;
     use super::*;
 
     /// Nodes on a grid, each on its own spring of 1000 N/m; a sphere and forces wander at random.
@@ -227,10 +250,13 @@ mod tests {
                 }
             }
             let state = State {
-                part: &part,
+                deformed: Deformed {
+                    part: &part,
+                    active: &active,
+                    bubbles: Bubbles::default(),
+                },
                 tool: &tool,
                 tool_pose: &pose,
-                active: &active,
                 is_active: &is_active,
             };
             let watched = list.update(state, reach).to_vec();

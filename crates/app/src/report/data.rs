@@ -6,10 +6,17 @@
 use glam::DVec3;
 
 /// Number of timed stages in a step; see [`STAGE_NAMES`].
-pub const N_STAGES: usize = 5;
+pub const N_STAGES: usize = 6;
 
 /// The timed stages of a step in their order, as they are called in tables and files.
-pub const STAGE_NAMES: [&str; N_STAGES] = ["proximity", "planes", "delassus", "lcp", "update"];
+pub const STAGE_NAMES: [&str; N_STAGES] = [
+    "proximity",
+    "planes",
+    "delassus",
+    "lcp",
+    "update",
+    "free_nodes",
+];
 
 /// Everything that one run tells.
 #[derive(Clone, Debug)]

@@ -153,6 +153,10 @@ pub fn step_time(rows: &[StepRow]) -> Result<String, Box<dyn Error>> {
     let colours = [SKY, GREEN, ORANGE, VERMILLION, PURPLE];
     let mut lines: Vec<(Key, Vec<f64>)> = Vec::new();
     for (stage_idx, name) in STAGE_NAMES.into_iter().enumerate() {
+        // A stage that the scene does not call for is no line.
+        if !rows.is_empty() && rows.iter().all(|row| row.stage_ns[stage_idx] == 0) {
+            continue;
+        }
         let times = sorted(rows.iter().map(|row| row.stage_ns[stage_idx]).collect());
         lines.push((Key::new(name, colours[stage_idx % colours.len()], 2), times));
     }

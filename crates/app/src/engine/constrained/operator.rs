@@ -1,0 +1,305 @@
+//! One set of free bubbles: the Cholesky factor of its Σ and the columns L⁻¹ Rᵀ of candidates.
+
+use glam::DVec3;
+
+use super::BubbleData;
+use crate::engine::ActiveContact;
+
+/// Σ_FF = L Lᵀ for the free bubbles F, appended row by row; memory for `max_free` of them.
+#[derive(Debug)]
+pub(super) struct FreeOperator {
+    bubbles: Vec<u32>,
+    is_in: Vec<bool>,
+    /// The set that is being built; `bubbles` is its beginning.
+    target: Vec<u32>,
+    /// L by rows, each `stride` long.
+    factor: Vec<f64>,
+    stride: usize,
+    /// By candidate and axis: L⁻¹ R_Fᵀ e, `stride` long.
+    columns: Vec<f64>,
+    has_column: Vec<bool>,
+    next_needed: usize,
+    /// Σ_FF⁻¹ R_Fᵀ f of the last state.
+    force: Vec<f64>,
+}
+
+impl FreeOperator {
+    pub(super) fn new(n_candidates: usize, n_bubbles: usize, max_free: usize) -> Self {
+        let stride = 3 * max_free;
+        Self {
+            bubbles: Vec::with_capacity(max_free),
+            is_in: vec![false; n_bubbles],
+            target: Vec::with_capacity(max_free),
+            factor: vec![0.0; stride * stride],
+            stride,
+            columns: vec![0.0; 3 * n_candidates * stride],
+            has_column: vec![false; n_candidates],
+            next_needed: 0,
+            force: vec![0.0; stride],
+        }
+    }
+
+    pub(super) fn clear(&mut self) {
+        for bubble in self.bubbles.drain(..) {
+            self.is_in[bubble as usize] = false;
+        }
+        self.target.clear();
+        self.has_column.fill(false);
+        self.next_needed = 0;
+    }
+
+    pub(super) fn n_free(&self) -> usize {
+        self.bubbles.len()
+    }
+
+    pub(super) fn bubbles(&self) -> &[u32] {
+        &self.bubbles
+    }
+
+    pub(super) fn has(&self, bubble: u32) -> bool {
+        self.is_in[bubble as usize]
+    }
+
+    /// Begins to build `target`; takes over the rows of `from` as far as the sets begin alike.
+    /// Returns how many bubbles that is.
+    pub(super) fn begin(&mut self, from: &Self, target: &[u32]) -> usize {
+        self.clear();
+        self.target.extend_from_slice(target);
+        let alike = from.bubbles.iter().zip(target);
+        let kept = alike.take_while(|(a, b)| a == b).count();
+        for &bubble in &target[..kept] {
+            self.bubbles.push(bubble);
+            self.is_in[bubble as usize] = true;
+        }
+        for row in 0..3 * kept {
+            let at = row * self.stride;
+            self.factor[at..=at + row].copy_from_slice(&from.factor[at..=at + row]);
+        }
+        kept
+    }
+
+    /// Works for about `work` multiply-adds at the target's factor and the columns of `needed`;
+    /// true once all is there.
+    pub(super) fn build(&mut self, data: &BubbleData, needed: &[u32], work: usize) -> bool {
+        let mut done = 0;
+        while done < work {
+            let rows = 3 * self.bubbles.len();
+            if let Some(&bubble) = self.target.get(self.bubbles.len()) {
+                for axis in 0..3 {
+                    self.append_row(data, bubble, axis);
+                }
+                self.bubbles.push(bubble);
+                self.is_in[bubble as usize] = true;
+                done += 3 * rows * rows / 2 + 1;
+            } else if let Some(&candidate) = needed.get(self.next_needed) {
+                self.next_needed += 1;
+                self.ensure(data, candidate);
+                done += 3 * rows * rows / 2 + 1;
+            } else {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// The next row of L: L x = Σ[F, row], diagonal by what is left.
+    fn append_row(&mut self, data: &BubbleData, bubble: u32, axis: usize) {
+        let n = 3 * data.positions.len();
+        let row = 3 * self.bubbles.len() + axis;
+        let column = &data.sigma[(3 * bubble as usize + axis) * n..][..n];
+        let (above, below) = self.factor.split_at_mut(row * self.stride);
+        let x = &mut below[..=row];
+        for (k, &other) in self.bubbles.iter().chain([&bubble]).enumerate() {
+            for c in 0..3 {
+                if 3 * k + c <= row {
+                    x[3 * k + c] = column[3 * other as usize + c];
+                }
+            }
+        }
+        forward(above, self.stride, &mut x[..row]);
+        // Σ is positive definite; round-off may not leave that of a bubble that follows others.
+        let left = x[row] - dot(&x[..row], &x[..row]);
+        let least = f64::EPSILON * column[3 * bubble as usize + axis];
+        x[row] = left.max(least).sqrt();
+    }
+
+    /// Makes the columns of a candidate.
+    pub(super) fn ensure(&mut self, data: &BubbleData, candidate: u32) {
+        let i = candidate as usize;
+        if self.has_column[i] {
+            return;
+        }
+        self.has_column[i] = true;
+        let rows = 3 * self.bubbles.len();
+        let n_bubbles = data.positions.len();
+        for axis in 0..3 {
+            let z = &mut self.columns[(3 * i + axis) * self.stride..][..rows];
+            for (z, &bubble) in z.chunks_exact_mut(3).zip(&self.bubbles) {
+                // Rᵀ e: row `axis` of R.
+                let block = &data.coupling[9 * (i * n_bubbles + bubble as usize)..][..9];
+                for (c, z) in z.iter_mut().enumerate() {
+                    *z = block[3 * c + axis];
+                }
+            }
+            forward(&self.factor, self.stride, z);
+        }
+    }
+
+    /// L⁻¹ R_Fᵀ v for a candidate whose columns are there.
+    pub(super) fn column_along(&self, candidate: u32, v: DVec3, out: &mut [f64]) {
+        debug_assert!(self.has_column[candidate as usize], "ensured before");
+        let [x, y, z] = [0, 1, 2].map(|axis| {
+            &self.columns[(3 * candidate as usize + axis) * self.stride..][..out.len()]
+        });
+        for (k, out) in out.iter_mut().enumerate() {
+            *out = x[k] * v.x + y[k] * v.y + z[k] * v.z;
+        }
+    }
+
+    /// Bubble forces Σ_FF⁻¹ R_Fᵀ f.
+    pub(super) fn solve(&mut self, data: &BubbleData, active: &[ActiveContact]) {
+        let rows = 3 * self.bubbles.len();
+        for contact in active {
+            self.ensure(data, contact.candidate);
+        }
+        let force = &mut self.force[..rows];
+        force.fill(0.0);
+        for contact in active {
+            for (axis, f) in contact.force_on_part.to_array().into_iter().enumerate() {
+                let column = 3 * contact.candidate as usize + axis;
+                let z = &self.columns[column * self.stride..][..rows];
+                for (sum, z) in force.iter_mut().zip(z) {
+                    *sum += f * z;
+                }
+            }
+        }
+        // Lᵀ x = y from the last row on.
+        for k in (0..rows).rev() {
+            let row = &self.factor[k * self.stride..][..=k];
+            let x = force[k] / row[k];
+            force[k] = x;
+            for (left, l) in force[..k].iter_mut().zip(row) {
+                *left -= x * l;
+            }
+        }
+    }
+
+    /// Force of the k-th free bubble after [`Self::solve`], N.
+    pub(super) fn force(&self, k: usize) -> DVec3 {
+        DVec3::from_slice(&self.force[3 * k..3 * k + 3])
+    }
+}
+
+/// L x = b in place, L by rows.
+fn forward(factor: &[f64], stride: usize, x: &mut [f64]) {
+    for k in 0..x.len() {
+        let row = &factor[k * stride..][..=k];
+        x[k] = (x[k] - dot(&row[..k], &x[..k])) / row[k];
+    }
+}
+
+/// Sum of products, in eight sums so that the compiler can keep them in one or two registers.
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (a_parts, b_parts) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest: f64 = a_parts
+        .remainder()
+        .iter()
+        .zip(b_parts.remainder())
+        .map(|(a, b)| a * b)
+        .sum();
+    for (a, b) in a_parts.zip(b_parts) {
+        for k in 0..8 {
+            sums[k] += a[k] * b[k];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three bubbles, two candidates; Σ diagonally dominant, R arbitrary.
+    fn data() -> BubbleData {
+        let n = 9;
+        let mut sigma = vec![0.0; n * n];
+        for c in 0..n {
+            for r in 0..n {
+                let value = if r == c {
+                    20.0 + c as f64
+                } else {
+                    1.0 / (1 + r + c) as f64
+                };
+                sigma[c * n + r] = value;
+            }
+        }
+        BubbleData {
+            positions: vec![DVec3::ZERO; 3],
+            coupling: (0..54).map(|k| f64::from((k * 7) % 11) - 5.0).collect(),
+            sigma,
+            bounds: vec![1.0; 2],
+        }
+    }
+
+    fn built(data: &BubbleData, from: &FreeOperator, target: &[u32], work: usize) -> FreeOperator {
+        let mut operator = FreeOperator::new(2, 3, 3);
+        operator.begin(from, target);
+        while !operator.build(data, &[0, 1], work) {}
+        operator
+    }
+
+    /// Largest |Σ_FF x - R_Fᵀ f| of the operator's answer x.
+    fn residual(data: &BubbleData, operator: &FreeOperator, active: &[ActiveContact]) -> f64 {
+        let free = operator.bubbles();
+        let mut worst = 0.0f64;
+        for &row_bubble in free {
+            for r in 0..3 {
+                let mut left = 0.0;
+                for (k, &bubble) in free.iter().enumerate() {
+                    for (c, x) in operator.force(k).to_array().into_iter().enumerate() {
+                        left += data.sigma
+                            [(3 * bubble as usize + c) * 9 + 3 * row_bubble as usize + r]
+                            * x;
+                    }
+                }
+                for contact in active {
+                    let at = 9 * (contact.candidate as usize * 3 + row_bubble as usize);
+                    let block = &data.coupling[at..at + 9];
+                    for (axis, f) in contact.force_on_part.to_array().into_iter().enumerate() {
+                        left -= block[3 * r + axis] * f;
+                    }
+                }
+                worst = worst.max(left.abs());
+            }
+        }
+        worst
+    }
+
+    #[test]
+    fn bubble_forces_are_those_of_the_inverse_for_any_order_of_building() {
+        let data = data();
+        let active: Vec<ActiveContact> = [(0, DVec3::new(1.0, -2.0, 0.5)), (1, DVec3::X)]
+            .map(|(candidate, force_on_part)| ActiveContact {
+                candidate,
+                normal_force: 1.0,
+                force_on_part,
+            })
+            .to_vec();
+        let empty = FreeOperator::new(2, 3, 3);
+        let first = built(&data, &empty, &[2, 0], 1);
+        for (from, target) in [
+            (&empty, &[0u32, 1, 2][..]),
+            (&first, &[2, 0, 1]),
+            (&first, &[2]),
+            (&first, &[0, 1]),
+            (&first, &[]),
+        ] {
+            let mut operator = built(&data, from, target, 10_000);
+            operator.solve(&data, &active);
+            assert_eq!(operator.bubbles(), target);
+            let residual = residual(&data, &operator, &active);
+            assert!(residual < 1e-13, "{target:?} {residual}");
+        }
+    }
+}

@@ -25,6 +25,8 @@ use device::VirtualCoupling;
 use glam::DVec3;
 use glamx::DPose3;
 
+use crate::free_nodes::LOOSE_RADIUS;
+
 use constrained::Constrained;
 pub use constrained::{BubbleData, FreeSettings};
 pub use part::ContactPart;
@@ -158,9 +160,25 @@ impl Engine {
         Ok(engine)
     }
 
+    /// m, how far from a node that can touch a node may be that is free under
+    /// [`FreeSettings::within`] this radius.
+    pub fn reach_of_free(radius: f64) -> f64 {
+        LOOSE_RADIUS * radius
+    }
+
     /// The part that steps act on.
     pub fn part(&self) -> &ContactPart {
         &self.part
+    }
+
+    /// What a step is allowed and asked to do.
+    pub fn settings(&self) -> &EngineSettings {
+        &self.settings
+    }
+
+    /// The virtual coupling between handle and tool, if there is one.
+    pub fn coupling(&self) -> Option<&VirtualCoupling> {
+        self.coupling.as_ref()
     }
 
     /// The rigid tool.
@@ -190,9 +208,9 @@ impl Engine {
         deformed(&self.part, &self.scratch, &self.constrained).displacement(candidate_idx)
     }
 
-    /// Bubbles that are added to the compliance's displacement in the last state, and their forces
-    /// (N); empty where no interface node is constrained.
-    pub fn bubble_forces(&self) -> &[(u32, DVec3)] {
+    /// Bubbles that are added to the compliance's displacement in the last state, and their amplitudes
+    /// (m); empty where no interface node is constrained.
+    pub fn bubble_amplitudes(&self) -> &[(u32, DVec3)] {
         bubbles_of(&self.constrained).terms
     }
 

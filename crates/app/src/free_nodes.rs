@@ -1,14 +1,11 @@
 //! Which interface nodes are free: near the contact, where the part bends, or as many as time allows.
 //!
 //! Source: Duriez et al. 2004, section 3.2: the free interface nodes are chosen at each time step in
-//! O(n_i). Here a step looks at a share of the nodes, so that its cost is O(n_i / [`SWEEP`]); each node
-//! has its turn every [`SWEEP`] steps. A node is freed at one limit and constrained again at a looser
-//! one, so that it does not chatter.
+//! O(n_i). Here a step looks at a share of the nodes and each has its turn, so that the cost of a step
+//! is a share of that. A node is freed at one limit and constrained again at a looser one, so that it
+//! does not chatter.
 
 use glam::DVec3;
-
-/// Steps in which every node is looked at once: at 1 kHz one picture of the display.
-const SWEEP: usize = 16;
 
 /// A free node is constrained beyond this multiple of the radius at which it was freed...
 pub(crate) const LOOSE_RADIUS: f64 = 1.25;
@@ -36,6 +33,8 @@ pub(crate) struct FreeNodes {
     is_free: Vec<bool>,
     n_free: usize,
     cursor: usize,
+    /// Nodes looked at in one call.
+    slice: usize,
     /// m; the rule's, or for [`Rule::Nearest`] the one that frees about `max_free` nodes.
     radius: f64,
     start_radius: f64,
@@ -44,8 +43,9 @@ pub(crate) struct FreeNodes {
 }
 
 impl FreeNodes {
-    /// `positions`: the interface nodes at rest, m. None is free yet.
-    pub(crate) fn new(rule: Rule, max_free: usize, positions: Vec<DVec3>) -> Self {
+    /// `positions`: the interface nodes at rest, m. `turns`: calls in which every node is looked at
+    /// once. None is free yet.
+    pub(crate) fn new(rule: Rule, max_free: usize, positions: Vec<DVec3>, turns: usize) -> Self {
         let (low, high) = positions
             .iter()
             .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(a, b), x| {
@@ -61,6 +61,7 @@ impl FreeNodes {
             rule,
             max_free,
             is_free: vec![false; positions.len()],
+            slice: positions.len().div_ceil(turns.max(1)),
             positions,
             n_free: 0,
             cursor: 0,
@@ -78,6 +79,17 @@ impl FreeNodes {
     /// Number of free nodes.
     pub(crate) fn n_free(&self) -> usize {
         self.n_free
+    }
+
+    /// Whether the rule asks for the bend of a node.
+    pub(crate) fn looks_at_bend(&self) -> bool {
+        matches!(self.rule, Rule::Indicator(_))
+    }
+
+    /// Nodes that the next [`Self::sweep`] will look at.
+    pub(crate) fn next_slice(&self) -> impl Iterator<Item = usize> + use<> {
+        let (cursor, n) = (self.cursor, self.positions.len());
+        (cursor..cursor + self.slice).map(move |i| i % n)
     }
 
     /// Constrains all.
@@ -98,7 +110,7 @@ impl FreeNodes {
         if contacts.is_empty() || n == 0 {
             return;
         }
-        for _ in 0..n.div_ceil(SWEEP) {
+        for _ in 0..self.slice {
             let i = self.cursor;
             let (wanted, kept) = match self.rule {
                 Rule::Indicator(limit) => {
@@ -151,19 +163,21 @@ impl FreeNodes {
 mod tests {
     use super::*;
 
+    const TURNS: usize = 16;
+
     fn line(n: usize) -> Vec<DVec3> {
         (0..n).map(|i| DVec3::new(i as f64, 0.0, 0.0)).collect()
     }
 
     fn sweeps(nodes: &mut FreeNodes, times: usize, contact: f64) {
-        for _ in 0..times * SWEEP {
+        for _ in 0..times * TURNS {
             nodes.sweep(&[DVec3::new(contact, 0.0, 0.0)], |_| 0.0, 0.0);
         }
     }
 
     #[test]
     fn nodes_near_the_contact_are_free_and_stay_so_a_little_farther() {
-        let mut nodes = FreeNodes::new(Rule::Radius(10.5), 100, line(100));
+        let mut nodes = FreeNodes::new(Rule::Radius(10.5), 100, line(100), TURNS);
         nodes.sweep(&[], |_| 0.0, 0.0);
         assert_eq!(nodes.n_free(), 0, "nothing touches");
         sweeps(&mut nodes, 2, 50.0);
@@ -182,7 +196,7 @@ mod tests {
 
     #[test]
     fn a_contact_that_trembles_changes_nothing() {
-        let mut nodes = FreeNodes::new(Rule::Radius(10.5), 100, line(100));
+        let mut nodes = FreeNodes::new(Rule::Radius(10.5), 100, line(100), TURNS);
         sweeps(&mut nodes, 2, 50.0);
         sweeps(&mut nodes, 2, 51.0);
         let settled = nodes.is_free().to_vec();
@@ -194,10 +208,10 @@ mod tests {
 
     #[test]
     fn bend_frees_at_the_limit_and_constrains_at_half() {
-        let mut nodes = FreeNodes::new(Rule::Indicator(0.1), 100, line(20));
+        let mut nodes = FreeNodes::new(Rule::Indicator(0.1), 100, line(20), TURNS);
         let contact = [DVec3::ZERO];
         let run = |nodes: &mut FreeNodes, scale: f64| {
-            for _ in 0..SWEEP {
+            for _ in 0..TURNS {
                 nodes.sweep(&contact, |i| scale * i as f64, 100.0);
             }
             nodes.n_free()
@@ -209,7 +223,7 @@ mod tests {
 
     #[test]
     fn no_more_than_allowed_are_free_and_they_are_the_nearest() {
-        let mut nodes = FreeNodes::new(Rule::Nearest, 20, line(200));
+        let mut nodes = FreeNodes::new(Rule::Nearest, 20, line(200), TURNS);
         sweeps(&mut nodes, 80, 100.0);
         assert!((16..=20).contains(&nodes.n_free()), "{}", nodes.n_free());
         let farthest = (0..200usize)

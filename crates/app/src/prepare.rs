@@ -4,17 +4,21 @@
 //! is cached under a hash of everything it depends on ([`cache`]); what it will need is told
 //! before it is begun ([`budget`]).
 
+mod bubbles;
 pub mod budget;
 pub mod cache;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use fem::{Compliance, ComplianceChecks, FactoredStiffness, Material, Mesh, Quadrature, Supports};
+use fem::{
+    BubbleCompliance, Compliance, ComplianceChecks, FactoredStiffness, Material, Mesh, Quadrature,
+    Supports,
+};
 use glam::DVec3;
 
 use crate::Error;
-use crate::engine::ContactPart;
+use crate::engine::{BubbleData, ContactPart};
 use crate::progress::Ui;
 use budget::Forecast;
 
@@ -46,6 +50,17 @@ pub struct PartSpec {
     pub contact: Vec<GroupRef>,
     /// Rule for the element integrals.
     pub quadrature: Quadrature,
+    /// Which interface nodes may be freed in a constrained part; `None`: nothing is constrained.
+    pub bubbles: Option<BubbleReach>,
+}
+
+/// Which interface nodes may be freed while a constrained part is touched.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum BubbleReach {
+    /// All of the part.
+    All,
+    /// Those within this distance of a node that can touch, m.
+    Within(f64),
 }
 
 /// How to prepare.
@@ -84,6 +99,8 @@ pub struct PreparedPart {
     pub compliance: Compliance,
     /// What was checked after the build.
     pub checks: ComplianceChecks,
+    /// The constrained part, where it is asked for.
+    pub bubbles: Option<BubbleCompliance>,
     /// Seconds by stage, in order; a cached part has only the reading.
     pub seconds: Vec<(&'static str, f64)>,
     /// Whether the compliance came from the cache.
@@ -96,6 +113,36 @@ impl PreparedPart {
     /// Seconds altogether.
     pub fn total_seconds(&self) -> f64 {
         self.seconds.iter().map(|(_, s)| s).sum()
+    }
+
+    /// What the engine needs of the part with constrained interface nodes.
+    pub fn constrained_part(&self, bubbles: &BubbleCompliance) -> (ContactPart, BubbleData) {
+        let at = |node: &u32| DVec3::from_array(self.loaded.mesh.nodes[*node as usize]);
+        let (n_rows, n_bubbles) = (bubbles.rows.len(), bubbles.bubbles.len());
+        let n_candidates = bubbles.candidates.len();
+        // The step reads the bubbles of one candidate after the other.
+        let mut coupling = vec![0.0; 9 * n_candidates * n_bubbles];
+        for j in 0..n_bubbles {
+            for i in 0..n_candidates {
+                coupling[9 * (i * n_bubbles + j)..][..9]
+                    .copy_from_slice(&bubbles.coupling[9 * (j * n_rows + i)..][..9]);
+            }
+        }
+        // A block off the diagonal of a positive definite matrix is no larger than the geometric
+        // mean of its two diagonal blocks; constrained parts are stiffer than the whole one.
+        let norms: Vec<f64> = (0..n_candidates)
+            .map(|i| self.compliance.block(i, i).iter().map(|c| c * c).sum())
+            .map(f64::sqrt)
+            .collect();
+        let largest = norms.iter().copied().fold(0.0, f64::max);
+        let data = BubbleData {
+            positions: bubbles.bubbles.iter().map(at).collect(),
+            coupling,
+            sigma: bubbles.sigma.clone(),
+            bounds: norms.iter().map(|norm| (norm * largest).sqrt()).collect(),
+        };
+        let rest = bubbles.candidates.iter().map(at).collect();
+        (ContactPart::new(rest, n_rows, bubbles.coarse.clone()), data)
     }
 
     /// What the engine needs of the part.
@@ -127,19 +174,12 @@ pub fn load(spec: &PartSpec) -> Result<LoadedPart, Error> {
     if spec.length_scale != 1.0 {
         mesh.scale(spec.length_scale);
     }
-    if let Some(order) = spec.order
-        && usize::from(order) != mesh.order as usize
+    if spec.refinements > 0
+        || spec
+            .order
+            .is_some_and(|o| usize::from(o) != mesh.order as usize)
     {
-        return Err(Error::Input(format!(
-            "{}: the mesh has elements of order {}, the scene asks for order = {order}; \
-             set part.order = {} or make the mesh with `gmsh -order {order}`",
-            path.display(),
-            mesh.order as usize,
-            mesh.order as usize
-        )));
-    }
-    if spec.refinements > 0 {
-        return Err(Error::Input("meshes are not refined yet".to_owned()));
+        return Err(Error::Input("ORDER".to_owned()));
     }
     let mut supports = Supports::new(mesh.n_nodes());
     for (name, components) in &spec.fixed {
@@ -221,25 +261,57 @@ pub fn prepare(
         ui.note(&format!("warning: {warning}"));
     }
     let mut seconds = vec![("read the mesh", begun.elapsed().as_secs_f64())];
+    let (compliance, checks, cached) = compliance_of(&loaded, options, ui, &mut seconds)?;
+    let bubbles = match loaded.spec.bubbles {
+        Some(reach) => {
+            let building = Instant::now();
+            let built = bubbles::build(&loaded, reach, ui)?;
+            seconds.push(("constrained part", building.elapsed().as_secs_f64()));
+            Some(built)
+        }
+        None => None,
+    };
+    let (from_cache, cache_file) = match cached {
+        Cached::Read(file) => (true, Some(file)),
+        Cached::Written(file) => (false, Some(file)),
+        Cached::No => (false, None),
+    };
+    Ok(PreparedPart {
+        loaded,
+        compliance,
+        checks,
+        bubbles,
+        seconds,
+        from_cache,
+        cache_file,
+    })
+}
 
-    let key = cache_key(&loaded);
+/// Where a compliance came from and went to.
+enum Cached {
+    Read(PathBuf),
+    Written(PathBuf),
+    No,
+}
+
+/// The compliance from the cache, or built and kept.
+fn compliance_of(
+    loaded: &LoadedPart,
+    options: &PrepareOptions,
+    ui: &Ui<'_>,
+    seconds: &mut Vec<(&'static str, f64)>,
+) -> Result<(Compliance, ComplianceChecks, Cached), Error> {
+    let key = cache_key(loaded);
     let cache_file = options
         .cache_dir
         .as_ref()
-        .map(|dir| cache::file_of(dir, &spec.mesh_path, &key));
+        .map(|dir| cache::file_of(dir, &loaded.spec.mesh_path, &key));
     if let (Some(file), false) = (&cache_file, options.rebuild) {
         let reading = Instant::now();
         match cache::read(file, &key, &loaded.candidates, &loaded.rows) {
             Ok(Some((compliance, checks))) => {
                 seconds.push(("read the cache", reading.elapsed().as_secs_f64()));
-                return Ok(PreparedPart {
-                    loaded,
-                    compliance,
-                    checks,
-                    seconds,
-                    from_cache: true,
-                    cache_file,
-                });
+                return Ok((compliance, checks, Cached::Read(file.clone())));
             }
             Ok(None) => {}
             Err(why) => {
@@ -251,16 +323,16 @@ pub fn prepare(
         }
     }
 
-    let forecast = Forecast::of(&loaded);
-    ui.note(&forecast.line(&loaded));
-    forecast.refuse_what_cannot_fit(&loaded)?;
+    let forecast = Forecast::of(loaded);
+    ui.note(&forecast.line(loaded));
+    forecast.refuse_what_cannot_fit(loaded)?;
 
-    let (compliance, checks, stages) = build(&loaded, ui)?;
+    let (compliance, checks, stages) = build(loaded, ui)?;
     seconds.extend(stages);
-    let mut written = None;
+    let mut cached = Cached::No;
     if let Some(file) = cache_file {
         match cache::write(&file, &key, &compliance, &checks) {
-            Ok(()) => written = Some(file),
+            Ok(()) => cached = Cached::Written(file),
             Err(source) => ui.note(&format!(
                 "{}: cannot keep the prepared part ({source}); the next run prepares it again \
                  (SNAPIN_CACHE names another folder)",
@@ -268,14 +340,7 @@ pub fn prepare(
             )),
         }
     }
-    Ok(PreparedPart {
-        loaded,
-        compliance,
-        checks,
-        seconds,
-        from_cache: false,
-        cache_file: written,
-    })
+    Ok((compliance, checks, cached))
 }
 
 /// Stiffness of a loaded part.
@@ -332,6 +397,7 @@ fn cache_key(loaded: &LoadedPart) -> [u8; 32] {
         hash.update(&x.to_bits().to_le_bytes());
     }
     hash.update(format!("{:?}", loaded.spec.quadrature).as_bytes());
+    hash.update(&[loaded.mesh.order as u8, loaded.spec.refinements]);
     for dof in 0..3 * loaded.mesh.n_nodes() {
         hash.update(&[u8::from(loaded.supports.is_fixed(dof))]);
     }

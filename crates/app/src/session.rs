@@ -256,7 +256,7 @@ impl Session<'_> {
     /// What the display would do between two steps: the whole surface.
     fn display(&mut self) -> Result<(), Error> {
         let begun = Instant::now();
-        let largest = shape::largest(self.shape.update(self.engine.active_contacts())?);
+        let largest = shape::largest(self.shape.update(self.engine)?);
         let elapsed = begun.elapsed().as_nanos() as u64;
         self.recording.max_surface_displacement =
             self.recording.max_surface_displacement.max(largest);

@@ -10,9 +10,9 @@ use device::{HandSettings, VirtualCoupling};
 use fem::{Material, Quadrature};
 
 use crate::Error;
-use crate::engine::{ContactIterations, Engine, EngineSettings};
-use crate::prepare::{GroupRef, PartSpec, PreparedPart};
-use crate::scene::{self, QuadratureRule, Scene, ToolShape};
+use crate::engine::{ContactIterations, Engine, EngineSettings, FreeSettings};
+use crate::prepare::{BubbleReach, GroupRef, PartSpec, PreparedPart};
+use crate::scene::{self, Adaptive, FreeNodes, PMethod, QuadratureRule, Scene, ToolShape};
 use crate::session::{Holds, SessionSpec, part_extent};
 
 /// The part of a scene.
@@ -31,6 +31,16 @@ pub fn part_spec(scene: &Scene) -> Result<PartSpec, Error> {
         length_scale: scene.length_scale,
         order: scene.part.order,
         refinements: 0,
+        bubbles: match scene.accuracy.adaptive {
+            Adaptive::On {
+                method: PMethod::Constrain,
+                free,
+            } => Some(match free {
+                FreeNodes::Radius(radius) => BubbleReach::Within(Engine::reach_of_free(radius)),
+                FreeNodes::Indicator(_) | FreeNodes::BudgetUs(_) => BubbleReach::All,
+            }),
+            _ => None,
+        },
         material: Material::new(material.young_modulus, material.poisson_ratio)
             .map_err(|e| Error::part(&scene.path, e))?,
         fixed: scene
@@ -140,13 +150,30 @@ pub fn engine(scene: &Scene, prepared: &PreparedPart, tool: Tool) -> Result<Engi
         scene.coupling.translational_stiffness,
         scene.coupling.rotational_stiffness,
     )?;
-    Engine::new(
-        Arc::new(prepared.contact_part()),
-        tool,
-        Some(coupling),
-        settings,
-    )
-    .map_err(|source| Error::Tool {
+    let engine = match (scene.accuracy.adaptive, &prepared.bubbles) {
+        (
+            Adaptive::On {
+                method: PMethod::Constrain,
+                free,
+            },
+            Some(bubbles),
+        ) => {
+            let (coarse, data) = prepared.constrained_part(bubbles);
+            let rule = match free {
+                FreeNodes::Radius(radius) => FreeSettings::within(radius),
+                FreeNodes::Indicator(limit) => FreeSettings::bent_beyond(limit),
+                FreeNodes::BudgetUs(budget) => FreeSettings::affordable(budget, &data),
+            };
+            Engine::constrained(coarse, data, rule, tool, Some(coupling), settings)
+        }
+        _ => Engine::new(
+            Arc::new(prepared.contact_part()),
+            tool,
+            Some(coupling),
+            settings,
+        ),
+    };
+    engine.map_err(|source| Error::Tool {
         path: scene.path.clone(),
         source,
     })

@@ -1,20 +1,37 @@
 //! The drawn shape: displacement of the whole surface under the contact forces of a step.
 //!
-//! At display rate, not in the step. It is the dense multiply `u = C f` over the surface's rows.
+//! At display rate, not in the step. With all interface nodes free it is the dense multiply
+//! `u = C f` over the surface's rows. With the p-method's "select" only principal and free interface
+//! nodes are multiplied, the others interpolated (Duriez et al. 2004, section 3.2: U_ic = G U_p); the
+//! forces do not depend on it. With "constrain" it is the shape of the constrained part that the
+//! engine solves for.
+
+mod select;
 
 use gpu::{Layout, Multiply};
 
 use crate::Error;
-use crate::engine::ActiveContact;
+use crate::engine::Engine;
 use crate::prepare::PreparedPart;
-use crate::scene::{self, Accuracy};
+use crate::scene::{self, Accuracy, Adaptive, PMethod};
+use select::Select;
 
 /// Displacement of all surface nodes, with its buffers.
 pub struct Shape {
-    multiply: Box<dyn Multiply>,
+    kind: Kind,
     columns: Vec<u32>,
     forces: Vec<f64>,
     displacement: Vec<f64>,
+}
+
+enum Kind {
+    Full(Box<dyn Multiply>),
+    Select(Box<Select>),
+    Constrained {
+        coarse: Box<dyn Multiply>,
+        coupling: Box<dyn Multiply>,
+        of_bubbles: Vec<f64>,
+    },
 }
 
 impl Shape {
@@ -25,33 +42,83 @@ impl Shape {
     pub fn new(prepared: &PreparedPart, accuracy: &Accuracy) -> Result<Self, Error> {
         let n_candidates = prepared.loaded.candidates.len();
         let n_rows = prepared.loaded.rows.len();
-        let layout = Layout::new(n_rows, n_candidates)?;
         let scalar = match accuracy.scalar {
             scene::Scalar::F64 => gpu::Scalar::F64,
             scene::Scalar::F32 => gpu::Scalar::F32,
         };
+        let upload = |n_columns: usize, blocks: &[f64]| {
+            gpu::on_cpu(Layout::new(n_rows, n_columns)?, blocks, scalar)
+        };
+        let mut n_columns = n_candidates;
+        let kind = match (accuracy.adaptive, &prepared.bubbles) {
+            (Adaptive::On { method, .. }, Some(bubbles)) if method == PMethod::Constrain => {
+                n_columns = n_columns.max(bubbles.bubbles.len());
+                Kind::Constrained {
+                    coarse: upload(n_candidates, &bubbles.coarse)?,
+                    coupling: upload(bubbles.bubbles.len(), &bubbles.coupling)?,
+                    of_bubbles: vec![0.0; 3 * n_rows],
+                }
+            }
+            (Adaptive::On { free, .. }, _) => {
+                Kind::Select(Box::new(Select::new(prepared, free, scalar)?))
+            }
+            (Adaptive::Off, _) => Kind::Full(upload(n_candidates, &prepared.compliance.blocks)?),
+        };
         Ok(Self {
-            multiply: gpu::on_cpu(layout, &prepared.compliance.blocks, scalar)?,
-            columns: Vec::with_capacity(n_candidates),
-            forces: Vec::with_capacity(3 * n_candidates),
+            kind,
+            columns: Vec::with_capacity(n_columns),
+            forces: Vec::with_capacity(3 * n_columns),
             displacement: vec![0.0; 3 * n_rows],
         })
     }
 
-    /// Displacement under these contact forces, 3 components for each of the part's rows, m.
-    /// Does not allocate.
+    /// Interface nodes of the surface that are drawn where they are, if some are interpolated.
+    pub fn n_free(&self) -> Option<usize> {
+        match &self.kind {
+            Kind::Select(select) => Some(select.n_free()),
+            Kind::Full(_) | Kind::Constrained { .. } => None,
+        }
+    }
+
+    /// Displacement in the engine's state, 3 components for each of the part's rows, m. Does not
+    /// allocate.
     ///
     /// # Errors
-    /// Forces that are not finite.
-    pub fn update(&mut self, contacts: &[ActiveContact]) -> Result<&[f64], Error> {
+    /// Those of the multiply, which an engine's state does not give.
+    pub fn update(&mut self, engine: &Engine) -> Result<&[f64], Error> {
+        let contacts = engine.active_contacts();
         self.columns.clear();
         self.forces.clear();
         for c in contacts {
             self.columns.push(c.candidate);
             self.forces.extend(c.force_on_part.to_array());
         }
-        self.multiply
-            .multiply_into(&self.columns, &self.forces, &mut self.displacement)?;
+        match &mut self.kind {
+            Kind::Full(multiply) => {
+                multiply.multiply_into(&self.columns, &self.forces, &mut self.displacement)?;
+            }
+            Kind::Select(select) => {
+                let rest = engine.part().rest_positions();
+                select.update(rest, &self.columns, &self.forces, &mut self.displacement)?;
+            }
+            Kind::Constrained {
+                coarse,
+                coupling,
+                of_bubbles,
+            } => {
+                coarse.multiply_into(&self.columns, &self.forces, &mut self.displacement)?;
+                self.columns.clear();
+                self.forces.clear();
+                for (bubble, amplitude) in engine.bubble_amplitudes() {
+                    self.columns.push(*bubble);
+                    self.forces.extend(amplitude.to_array());
+                }
+                coupling.multiply_into(&self.columns, &self.forces, of_bubbles)?;
+                for (u, more) in self.displacement.iter_mut().zip(of_bubbles) {
+                    *u += *more;
+                }
+            }
+        }
         Ok(&self.displacement)
     }
 }

@@ -13,7 +13,7 @@ use crate::stiffness::ElementRule;
 /// K of all degrees of freedom (3 node + component), held or not, N/m.
 #[derive(Clone, Debug)]
 pub struct Stiffness {
-    matrix: SparseColMat<u32, f64>,
+    pub(crate) matrix: SparseColMat<u32, f64>,
 }
 
 impl Stiffness {

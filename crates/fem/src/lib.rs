@@ -33,10 +33,12 @@
 
 mod assembly;
 mod compliance;
+mod constrained;
 pub mod element;
 mod error;
 mod factor;
 mod geometry;
+mod hierarchy;
 pub mod load;
 mod material;
 pub mod mesh;
@@ -48,9 +50,11 @@ mod supports;
 
 pub use assembly::{Stiffness, assemble_stiffness};
 pub use compliance::{Compliance, ComplianceChecks};
+pub use constrained::{BubbleCompliance, ConstrainedStiffness};
 pub use element::Order;
 pub use error::Error;
 pub use factor::FactoredStiffness;
+pub use hierarchy::{Constraint, Constraints, Edge, Hierarchy, Rule};
 pub use material::Material;
 pub use mesh::{Face, Group, Mesh};
 pub use progress::{Progress, Silent};

@@ -5,5 +5,6 @@
 mod architecture;
 mod bad_input;
 mod docs;
+mod p_method;
 mod scenes;
 mod verify;

@@ -6,8 +6,8 @@
 //! ```text
 //! G(F) = G_0 + R_F Σ_FF⁻¹ R_Fᵀ
 //! ```
-//! G_0: all interface nodes constrained. R: displacement of candidates per bubble force. Σ: stiffness
-//! of the bubbles on the elastic coarse part. A switch to another F needs one Cholesky of 3 n_f rows,
+//! G_0: all interface nodes constrained. R: displacement of candidates per bubble amplitude. Σ:
+//! stiffness of the bubbles on the elastic coarse part. A switch to another F needs one Cholesky of 3 n_f rows,
 //! made over [`BUILD_STEPS`] steps, and is then blended in,
 //!
 //! ```text
@@ -21,6 +21,8 @@
 
 mod operator;
 
+use std::time::Instant;
+
 use bytemuck::cast_slice;
 use contact::plane::Plane;
 use glam::{DMat3, DVec3};
@@ -29,6 +31,9 @@ use super::ActiveContact;
 use super::part::Bubbles;
 use crate::free_nodes::{FreeNodes, Rule};
 use operator::{FreeOperator, dot};
+
+/// Steps in which every bubble is looked at once: at 1 kHz one picture of the display.
+const SWEEP: usize = 16;
 
 /// Steps over which the factor and the columns of a new free set are made.
 const BUILD_STEPS: usize = 20;
@@ -41,7 +46,7 @@ const LEAST_WORK: usize = 20_000;
 pub struct BubbleData {
     /// Rest positions of the bubbles' nodes, m.
     pub positions: Vec<DVec3>,
-    /// R: block of candidate i and bubble j at `9 (i n_bubbles + j)`, m/N.
+    /// R: block of candidate i and bubble j at `9 (i n_bubbles + j)`, without unit.
     pub coupling: Vec<f64>,
     /// Σ, 3 n_bubbles x 3 n_bubbles, symmetric, N/m.
     pub sigma: Vec<f64>,
@@ -52,9 +57,73 @@ pub struct BubbleData {
 /// How the free bubbles are chosen.
 #[derive(Clone, Copy, Debug)]
 pub struct FreeSettings {
-    pub(crate) rule: Rule,
+    rule: Rule,
     /// Free nodes that memory is reserved for; the nearest are freed, the rest stays constrained.
     pub max_free: usize,
+}
+
+/// Free nodes at most: a factor of 1200 rows is 12 MB, and its columns fill the memory of a part
+/// that is large already. The nearest are freed.
+const MOST_FREE: usize = 400;
+
+/// Rows and passes that a time budget is reckoned with.
+const TYPICAL_ROWS: usize = 32;
+const TYPICAL_PASSES: usize = 3;
+
+impl FreeSettings {
+    /// Those within this distance of a contact at rest, m.
+    pub fn within(radius: f64) -> Self {
+        Self {
+            rule: Rule::Radius(radius),
+            max_free: MOST_FREE,
+        }
+    }
+
+    /// Those that would move by more than this share of the largest displacement.
+    pub fn bent_beyond(share: f64) -> Self {
+        Self {
+            rule: Rule::Indicator(share),
+            max_free: MOST_FREE,
+        }
+    }
+
+    /// The nearest ones, as many as the step can have in `budget_us` beside what it takes anyway.
+    /// Measured here and now, so that no choice depends on the clock later.
+    pub fn affordable(budget_us: f64, data: &BubbleData) -> Self {
+        let sample: Vec<f64> = (0..3000).map(|k| f64::from(k % 7)).collect();
+        let mut times = [0.0; 31];
+        let mut sum = 0.0;
+        for time in &mut times {
+            let begun = Instant::now();
+            for start in 0..100 {
+                sum += dot(
+                    &sample[start..start + 1000],
+                    &sample[1000 + start..2000 + start],
+                );
+            }
+            *time = 1e6 * begun.elapsed().as_secs_f64() / 1e5;
+        }
+        std::hint::black_box(sum);
+        times.sort_by(f64::total_cmp);
+        let affordable = (budget_us / times[15]).max(0.0);
+        let most = MOST_FREE.min(data.positions.len());
+        Self {
+            rule: Rule::Nearest,
+            max_free: (0..=most)
+                .rev()
+                .find(|n_free| work_of_step(*n_free) <= affordable)
+                .unwrap_or(0),
+        }
+    }
+}
+
+/// Multiply-adds of a step with so many free nodes, the building of another set included.
+fn work_of_step(n_free: usize) -> f64 {
+    let rows = 3.0 * n_free as f64;
+    let m = TYPICAL_ROWS as f64;
+    let pass = rows * rows / 2.0 + m * m * rows / 2.0 + 9.0 * m * rows;
+    let build = (rows * rows * rows / 6.0 + 3.0 * m * rows * rows / 2.0) / BUILD_STEPS as f64;
+    TYPICAL_PASSES as f64 * pass + build
 }
 
 /// What happens with the free set.
@@ -76,7 +145,7 @@ pub(super) struct Constrained {
     stage: Stage,
     now: FreeOperator,
     next: FreeOperator,
-    /// Bubbles that are free in either operator, and their forces in the last state.
+    /// Bubbles that are free in either operator, and their amplitudes in the last state, m.
     terms: Vec<(u32, DVec3)>,
     /// By bubble: its place in `terms`, or `u32::MAX`.
     term_of: Vec<u32>,
@@ -102,7 +171,7 @@ impl Constrained {
         let max_free = settings.max_free.min(n_bubbles);
         let operator = || FreeOperator::new(n_candidates, n_bubbles, max_free);
         Self {
-            free: FreeNodes::new(settings.rule, max_free, data.positions.clone()),
+            free: FreeNodes::new(settings.rule, max_free, data.positions.clone(), SWEEP),
             stage: Stage::Steady,
             now: operator(),
             next: operator(),
@@ -288,7 +357,7 @@ impl Constrained {
         }
     }
 
-    /// Forces of the bubbles under these contacts. Every contact's candidate had a plane.
+    /// Amplitudes of the bubbles under these contacts. Every contact's candidate had a plane.
     pub(super) fn adopt_forces(&mut self, active: &[ActiveContact]) {
         for (bubble, _) in self.terms.drain(..) {
             self.term_of[bubble as usize] = u32::MAX;
@@ -307,13 +376,13 @@ impl Constrained {
             }
             operator.solve(&self.data, active);
             for (k, &bubble) in operator.bubbles().iter().enumerate() {
-                let force = share * operator.force(k);
+                let amplitude = share * operator.amplitude(k);
                 match self.term_of[bubble as usize] {
                     u32::MAX => {
                         self.term_of[bubble as usize] = self.terms.len() as u32;
-                        self.terms.push((bubble, force));
+                        self.terms.push((bubble, amplitude));
                     }
-                    at => self.terms[at as usize].1 += force,
+                    at => self.terms[at as usize].1 += amplitude,
                 }
             }
         }

@@ -101,7 +101,7 @@ impl ContactPart {
 pub(super) struct Deformed<'a> {
     pub(super) part: &'a ContactPart,
     pub(super) active: &'a [ActiveContact],
-    /// Displacement per bubble of each candidate, and the bubbles that are not zero; empty without
+    /// Displacement of each candidate per bubble, and the bubbles that are not zero; empty without
     /// the constrained p-method.
     pub(super) bubbles: Bubbles<'a>,
 }
@@ -112,7 +112,7 @@ pub(super) struct Bubbles<'a> {
     /// Block of candidate i and bubble j at `i n_bubbles + j`.
     pub(super) coupling: &'a [DMat3],
     pub(super) n_bubbles: usize,
-    /// Bubble and its force (N).
+    /// Bubble and its amplitude, m.
     pub(super) terms: &'a [(u32, DVec3)],
     /// Full switches of the operator since the start, each no more than the whole compliance.
     pub(super) switched: f64,
@@ -123,8 +123,8 @@ impl Deformed<'_> {
     #[inline]
     pub(super) fn displacement(&self, i: usize) -> DVec3 {
         let mut u = self.part.displacement(i, self.active);
-        for &(bubble, force) in self.bubbles.terms {
-            u += self.bubbles.coupling[i * self.bubbles.n_bubbles + bubble as usize] * force;
+        for &(bubble, amplitude) in self.bubbles.terms {
+            u += self.bubbles.coupling[i * self.bubbles.n_bubbles + bubble as usize] * amplitude;
         }
         u
     }

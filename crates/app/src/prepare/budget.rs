@@ -120,6 +120,7 @@ mod tests {
             length_scale: 1.0,
             order: Some(2),
             refinements: 0,
+            bubbles: None,
             material: Material::new(2.7e9, 0.35).unwrap(),
             fixed: vec![(group("fixed"), [true; 3])],
             contact: vec![group("contact")],

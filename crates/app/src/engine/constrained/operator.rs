@@ -19,8 +19,8 @@ pub(super) struct FreeOperator {
     columns: Vec<f64>,
     has_column: Vec<bool>,
     next_needed: usize,
-    /// Σ_FF⁻¹ R_Fᵀ f of the last state.
-    force: Vec<f64>,
+    /// Σ_FF⁻¹ R_Fᵀ f of the last state, m.
+    amplitude: Vec<f64>,
 }
 
 impl FreeOperator {
@@ -35,7 +35,7 @@ impl FreeOperator {
             columns: vec![0.0; 3 * n_candidates * stride],
             has_column: vec![false; n_candidates],
             next_needed: 0,
-            force: vec![0.0; stride],
+            amplitude: vec![0.0; stride],
         }
     }
 
@@ -156,19 +156,19 @@ impl FreeOperator {
         }
     }
 
-    /// Bubble forces Σ_FF⁻¹ R_Fᵀ f.
+    /// Bubble amplitudes Σ_FF⁻¹ R_Fᵀ f.
     pub(super) fn solve(&mut self, data: &BubbleData, active: &[ActiveContact]) {
         let rows = 3 * self.bubbles.len();
         for contact in active {
             self.ensure(data, contact.candidate);
         }
-        let force = &mut self.force[..rows];
-        force.fill(0.0);
+        let amplitude = &mut self.amplitude[..rows];
+        amplitude.fill(0.0);
         for contact in active {
             for (axis, f) in contact.force_on_part.to_array().into_iter().enumerate() {
                 let column = 3 * contact.candidate as usize + axis;
                 let z = &self.columns[column * self.stride..][..rows];
-                for (sum, z) in force.iter_mut().zip(z) {
+                for (sum, z) in amplitude.iter_mut().zip(z) {
                     *sum += f * z;
                 }
             }
@@ -176,17 +176,17 @@ impl FreeOperator {
         // Lᵀ x = y from the last row on.
         for k in (0..rows).rev() {
             let row = &self.factor[k * self.stride..][..=k];
-            let x = force[k] / row[k];
-            force[k] = x;
-            for (left, l) in force[..k].iter_mut().zip(row) {
+            let x = amplitude[k] / row[k];
+            amplitude[k] = x;
+            for (left, l) in amplitude[..k].iter_mut().zip(row) {
                 *left -= x * l;
             }
         }
     }
 
-    /// Force of the k-th free bubble after [`Self::solve`], N.
-    pub(super) fn force(&self, k: usize) -> DVec3 {
-        DVec3::from_slice(&self.force[3 * k..3 * k + 3])
+    /// Amplitude of the k-th free bubble after [`Self::solve`], m.
+    pub(super) fn amplitude(&self, k: usize) -> DVec3 {
+        DVec3::from_slice(&self.amplitude[3 * k..3 * k + 3])
     }
 }
 
@@ -257,7 +257,7 @@ mod tests {
             for r in 0..3 {
                 let mut left = 0.0;
                 for (k, &bubble) in free.iter().enumerate() {
-                    for (c, x) in operator.force(k).to_array().into_iter().enumerate() {
+                    for (c, x) in operator.amplitude(k).to_array().into_iter().enumerate() {
                         left += data.sigma
                             [(3 * bubble as usize + c) * 9 + 3 * row_bubble as usize + r]
                             * x;
@@ -277,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn bubble_forces_are_those_of_the_inverse_for_any_order_of_building() {
+    fn bubble_amplitudes_are_those_of_the_inverse_for_any_order_of_building() {
         let data = data();
         let active: Vec<ActiveContact> = [(0, DVec3::new(1.0, -2.0, 0.5)), (1, DVec3::X)]
             .map(|(candidate, force_on_part)| ActiveContact {

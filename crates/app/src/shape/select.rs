@@ -1,0 +1,228 @@
+//! The p-method's "select": exact at principal and free nodes, interpolated at the others.
+
+use std::time::Instant;
+
+use fem::{Hierarchy, Rule as Following};
+use glam::DVec3;
+use gpu::{Layout, Multiply, Scalar};
+
+use crate::Error;
+use crate::free_nodes::{FreeNodes, Rule};
+use crate::prepare::PreparedPart;
+use crate::scene;
+
+/// Updates in which a node that is freed or constrained moves from one place to the other: 80 ms at
+/// 60 Hz, too slow to be seen as a jump.
+const BLEND_UPDATES: f64 = 5.0;
+
+/// Updates in which every node is looked at once.
+const SWEEP: usize = 4;
+
+/// Contacts that a time budget is reckoned with.
+const TYPICAL_CONTACTS: usize = 16;
+
+/// Rows with principal nodes first, so that they are multiplied as one stretch.
+pub(super) struct Select {
+    multiply: Box<dyn Multiply>,
+    free: FreeNodes,
+    n_principal: usize,
+    /// Row of the surface, by row of the multiply.
+    row_of: Vec<u32>,
+    /// Masters of the interface rows: those of the k-th at `starts[k]..starts[k + 1]`.
+    masters: Vec<(u32, f64)>,
+    starts: Vec<u32>,
+    /// By interface row: 0 where interpolated, 1 where exact, between while it moves.
+    exact: Vec<f64>,
+    /// Rows that are multiplied beside the principal ones.
+    listed: Vec<u32>,
+    contacts: Vec<DVec3>,
+    u: Vec<f64>,
+}
+
+impl Select {
+    pub(super) fn new(
+        prepared: &PreparedPart,
+        free: scene::FreeNodes,
+        scalar: Scalar,
+    ) -> Result<Self, Error> {
+        let loaded = &prepared.loaded;
+        let (n_rows, n_candidates) = (loaded.rows.len(), loaded.candidates.len());
+        let hierarchy = Hierarchy::of(&loaded.mesh);
+        let is_principal = |row: &u32| hierarchy.is_principal(loaded.rows[*row as usize]);
+        let mut row_of: Vec<u32> = (0..n_rows as u32).filter(is_principal).collect();
+        let n_principal = row_of.len();
+        row_of.extend((0..n_rows as u32).filter(|row| !is_principal(row)));
+
+        let mut place_of_node = vec![u32::MAX; loaded.mesh.n_nodes()];
+        for (place, row) in (0..).zip(&row_of) {
+            place_of_node[loaded.rows[*row as usize] as usize] = place;
+        }
+        // The exact rule for curved edges asks for vertices inside the part, which have no row; the
+        // straight rule serves to draw.
+        let interface: Vec<u32> = row_of[n_principal..]
+            .iter()
+            .map(|row| loaded.rows[*row as usize])
+            .collect();
+        let constraints = hierarchy.constrain(&interface, &loaded.supports, Following::Plain);
+        let (mut masters, mut starts) = (Vec::new(), vec![0]);
+        for node in &interface {
+            let constraint = constraints.of_node(*node);
+            let weights = constraint.map_or(&[][..], |constraint| constraint.weights);
+            let of_place =
+                |(master, weight): &(u32, f64)| (place_of_node[*master as usize], *weight);
+            masters.extend(weights.iter().map(of_place));
+            starts.push(masters.len() as u32);
+        }
+        let positions = interface
+            .iter()
+            .map(|node| DVec3::from_array(loaded.mesh.nodes[*node as usize]))
+            .collect();
+
+        let blocks = &prepared.compliance.blocks;
+        let mut permuted = Vec::with_capacity(blocks.len());
+        for column in blocks.chunks_exact((9 * n_rows).max(1)) {
+            for row in &row_of {
+                permuted.extend_from_slice(&column[9 * *row as usize..][..9]);
+            }
+        }
+        let layout = Layout::new(n_rows, n_candidates)?;
+        let mut multiply = gpu::on_cpu(layout, &permuted, scalar)?;
+        let n_interface = n_rows - n_principal;
+        let (rule, max_free) = match free {
+            scene::FreeNodes::Radius(radius) => (Rule::Radius(radius), n_interface),
+            scene::FreeNodes::Indicator(limit) => (Rule::Indicator(limit), n_interface),
+            scene::FreeNodes::BudgetUs(budget) => {
+                let rows = affordable_rows(multiply.as_mut(), n_principal, budget)?;
+                (Rule::Nearest, rows)
+            }
+        };
+        Ok(Self {
+            multiply,
+            free: FreeNodes::new(rule, max_free, positions, SWEEP),
+            n_principal,
+            row_of,
+            masters,
+            starts,
+            exact: vec![0.0; n_interface],
+            listed: Vec::with_capacity(n_interface),
+            contacts: Vec::with_capacity(n_candidates),
+            u: vec![0.0; 3 * n_rows],
+        })
+    }
+
+    pub(super) fn n_free(&self) -> usize {
+        self.free.n_free()
+    }
+
+    /// `rest`: rest positions of the candidates, m.
+    pub(super) fn update(
+        &mut self,
+        rest: &[DVec3],
+        columns: &[u32],
+        forces: &[f64],
+        displacement: &mut [f64],
+    ) -> Result<(), Error> {
+        self.list_rows();
+        self.multiply.multiply_rows_into(
+            columns,
+            forces,
+            self.n_principal,
+            &self.listed,
+            &mut self.u,
+        )?;
+
+        self.contacts.clear();
+        self.contacts
+            .extend(columns.iter().map(|c| rest[*c as usize]));
+        let (u, masters, starts, n_principal) =
+            (&self.u, &self.masters, &self.starts, self.n_principal);
+        let interpolated = |k: usize| -> DVec3 {
+            masters[starts[k] as usize..starts[k + 1] as usize]
+                .iter()
+                .map(|&(master, weight)| weight * DVec3::from_slice(&u[3 * master as usize..][..3]))
+                .sum()
+        };
+        let exact_at = |k: usize| DVec3::from_slice(&u[3 * (n_principal + k)..][..3]);
+        let largest = if self.free.looks_at_bend() {
+            super::largest(&u[..3 * n_principal])
+        } else {
+            0.0
+        };
+        self.free.sweep(
+            &self.contacts,
+            |k| (exact_at(k) - interpolated(k)).length(),
+            largest,
+        );
+
+        for (place, row) in self.row_of.iter().enumerate() {
+            let drawn = match place.checked_sub(n_principal) {
+                None => DVec3::from_slice(&u[3 * place..][..3]),
+                Some(k) => match self.exact[k] {
+                    0.0 => interpolated(k),
+                    1.0 => exact_at(k),
+                    share => interpolated(k).lerp(exact_at(k), share),
+                },
+            };
+            displacement[3 * *row as usize..][..3].copy_from_slice(&drawn.to_array());
+        }
+        for (share, is_free) in self.exact.iter_mut().zip(self.free.is_free()) {
+            let towards = if *is_free { 1.0 } else { -1.0 };
+            *share = (*share + towards / BLEND_UPDATES).clamp(0.0, 1.0);
+        }
+        Ok(())
+    }
+
+    /// Interface rows whose exact displacement is wanted.
+    fn list_rows(&mut self) {
+        let Self {
+            listed,
+            free,
+            exact,
+            n_principal,
+            ..
+        } = self;
+        let row = |k: usize| (*n_principal + k) as u32;
+        listed.clear();
+        let is_wanted = |k: usize| free.is_free()[k] || exact[k] > 0.0;
+        listed.extend((0..exact.len()).filter(|k| is_wanted(*k)).map(row));
+        if free.looks_at_bend() {
+            listed.extend(free.next_slice().filter(|k| !is_wanted(*k)).map(row));
+        }
+    }
+}
+
+/// How many listed rows can be multiplied within `budget_us`, measured here and now, so that the
+/// choice does not depend on the clock later.
+fn affordable_rows(
+    multiply: &mut dyn Multiply,
+    n_principal: usize,
+    budget_us: f64,
+) -> Result<usize, Error> {
+    let layout = multiply.layout();
+    let n_interface = layout.n_rows() - n_principal;
+    if n_interface == 0 || layout.n_candidates() == 0 {
+        return Ok(n_interface);
+    }
+    let columns: Vec<u32> = (0..TYPICAL_CONTACTS)
+        .map(|k| (k * layout.n_candidates() / TYPICAL_CONTACTS) as u32)
+        .collect();
+    let forces = vec![1.0; 3 * columns.len()];
+    let mut u = vec![0.0; layout.displacement_len()];
+    let rows: Vec<u32> = (n_principal..layout.n_rows())
+        .map(|row| row as u32)
+        .collect();
+    let mut median_us = |rows: &[u32]| -> Result<f64, Error> {
+        let mut times = [0.0; 31];
+        for time in &mut times {
+            let begun = Instant::now();
+            multiply.multiply_rows_into(&columns, &forces, n_principal, rows, &mut u)?;
+            *time = 1e6 * begun.elapsed().as_secs_f64();
+        }
+        times.sort_by(f64::total_cmp);
+        Ok(times[15])
+    };
+    let first = median_us(&[])?;
+    let each = ((median_us(&rows)? - first) / n_interface as f64).max(1e-6);
+    let affordable = ((budget_us - first) / each).max(0.0) as usize;
+    Ok(affordable.min(n_interface))
+}

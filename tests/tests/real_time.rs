@@ -11,8 +11,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use glamx::DPose3;
 use snapin::prepare::{PrepareOptions, prepare};
 use snapin::progress::Ui;
-use snapin::scene::Scene;
+use snapin::scene::{Adaptive, FreeNodes, PMethod, Scene};
 use snapin::setup;
+use snapin::shape::Shape;
 use snapin_tests::root;
 
 struct Counting;
@@ -40,11 +41,19 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// Both scenes, pushed in and pulled out again, a jump of the handle and a pose that is refused.
+/// Both scenes, pushed in and pulled out again, a jump of the handle and a pose that is refused; the
+/// clip also with free nodes chosen, built and blended in on the way, and its shape drawn.
 #[test]
 fn no_step_of_an_insertion_allocates() {
-    for name in ["clip.toml", "hook.toml"] {
-        let scene = Scene::load(&root().join("scenes").join(name)).unwrap();
+    let on = |method, free| Adaptive::On { method, free };
+    for (name, adaptive) in [
+        ("clip.toml", Adaptive::Off),
+        ("hook.toml", Adaptive::Off),
+        ("clip.toml", on(PMethod::Select, FreeNodes::Indicator(1e-3))),
+        ("clip.toml", on(PMethod::Constrain, FreeNodes::Radius(3e-3))),
+    ] {
+        let mut scene = Scene::load(&root().join("scenes").join(name)).unwrap();
+        scene.accuracy.adaptive = adaptive;
         let mut unseen = std::io::sink();
         let ui = Ui::new(&mut unseen, false);
         let prepared = prepare(
@@ -55,6 +64,7 @@ fn no_step_of_an_insertion_allocates() {
         .unwrap();
         let (tool, _) = setup::tool(&scene).unwrap();
         let mut engine = setup::engine(&scene, &prepared, tool).unwrap();
+        let mut shape = Shape::new(&prepared, &scene.accuracy).unwrap();
         let start = scene.tool.pose_part_tool;
         let at = |share: f64| DPose3 {
             translation: start.translation + share * scene.hand.travel * scene.hand.direction,
@@ -69,9 +79,10 @@ fn no_step_of_an_insertion_allocates() {
         let mut touched = 0;
         for &share in in_and_out.iter().chain(&jump) {
             touched += u32::from(engine.step(&at(share)).contacts > 0);
+            shape.update(&engine).unwrap();
         }
         let after = ALLOCATIONS.load(Ordering::Relaxed);
         assert!(touched > 100, "{name}: contact in {touched} steps only");
-        assert_eq!(after - before, 0, "{name}");
+        assert_eq!(after - before, 0, "{name} {adaptive:?}");
     }
 }

@@ -41,7 +41,7 @@ impl Story<'_> {
             recording,
             ..
         } = self;
-        let solver = FieldSolver::new(&prepared.loaded, progress)?;
+        let solver = FieldSolver::new(prepared, progress)?;
         let moments = Moments::of(recording);
         let mut extremes = fem::stress::Extremes::default();
         let mut look = |u: &[f64]| {
@@ -54,13 +54,13 @@ impl Story<'_> {
             if crate::interrupt::is_requested() {
                 return Err(Error::Interrupted);
             }
-            look(&solver.displacement(recording.contacts(&recording.records[index])));
+            look(&solver.displacement(recording, &recording.records[index]));
         }
         let tool_extent = 0.4 * part_extent(&prepared.loaded.mesh);
         let mut frames = Vec::new();
         for (label, index) in moments.labelled(scene.output.frames as usize) {
             let record = &recording.records[index];
-            let u = solver.displacement(recording.contacts(record));
+            let u = solver.displacement(recording, record);
             look(&u);
             frames.push(self.frame(label, record, &u, solver.von_mises(&u), tool_extent));
         }

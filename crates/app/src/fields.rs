@@ -1,44 +1,97 @@
 //! Displacement, strain and stress of the whole part under recorded contact forces.
 
-use fem::FactoredStiffness;
 use fem::stress::Extremes;
+use fem::{ConstrainedStiffness, FactoredStiffness, Hierarchy, Rule, Stiffness};
+use glam::DVec3;
 
 use crate::Error;
-use crate::engine::ActiveContact;
-use crate::prepare::{LoadedPart, assemble};
+use crate::prepare::{LoadedPart, PreparedPart, assemble};
+use crate::session::{Record, Recording};
 
 /// Solves for the whole part, not only its surface. Made once, for the pictures after a run.
 #[derive(Debug)]
 pub struct FieldSolver<'a> {
     loaded: &'a LoadedPart,
-    factor: FactoredStiffness,
+    solver: Solver<'a>,
     of_element: Vec<u32>,
 }
 
+#[derive(Debug)]
+enum Solver<'a> {
+    Full(FactoredStiffness),
+    Constrained {
+        stiffness: Stiffness,
+        coarse: Box<ConstrainedStiffness>,
+        /// Nodes of the bubbles.
+        bubbles: &'a [u32],
+    },
+}
+
 impl<'a> FieldSolver<'a> {
-    /// Assembles and factors the stiffness.
+    /// Assembles and factors the stiffness, of the constrained part where that is what was felt.
     ///
     /// # Errors
     /// As `fem` reports them; Ctrl-C.
-    pub fn new(loaded: &'a LoadedPart, progress: &dyn fem::Progress) -> Result<Self, Error> {
+    pub fn new(prepared: &'a PreparedPart, progress: &dyn fem::Progress) -> Result<Self, Error> {
+        let loaded = &prepared.loaded;
         let stiffness = assemble(loaded)?;
-        let factor = FactoredStiffness::new(&stiffness, &loaded.supports, progress)
-            .map_err(|e| Error::part(&loaded.spec.mesh_path, e))?;
+        let in_part = |e| Error::part(&loaded.spec.mesh_path, e);
+        let solver = match &prepared.bubbles {
+            None => Solver::Full(
+                FactoredStiffness::new(&stiffness, &loaded.supports, progress).map_err(in_part)?,
+            ),
+            Some(bubbles) => {
+                let hierarchy = Hierarchy::of(&loaded.mesh);
+                let all = hierarchy.interface_nodes();
+                let constraints = hierarchy.constrain(all, &loaded.supports, Rule::AffineExact);
+                let coarse =
+                    ConstrainedStiffness::new(&stiffness, &loaded.supports, &constraints, progress)
+                        .map_err(in_part)?;
+                Solver::Constrained {
+                    stiffness,
+                    coarse: Box::new(coarse),
+                    bubbles: &bubbles.bubbles,
+                }
+            }
+        };
         Ok(Self {
             loaded,
-            factor,
+            solver,
             of_element: vec![0; loaded.mesh.n_elements()],
         })
     }
 
-    /// Displacement of all nodes (3 node + component) under contact forces, m.
-    pub fn displacement(&self, contacts: &[ActiveContact]) -> Vec<f64> {
-        let mut force = vec![0.0; 3 * self.loaded.mesh.n_nodes()];
-        for c in contacts {
+    /// Displacement of all nodes (3 node + component) in a recorded step, m.
+    pub fn displacement(&self, recording: &Recording, record: &Record) -> Vec<f64> {
+        let n_dofs = 3 * self.loaded.mesh.n_nodes();
+        let mut force = vec![0.0; n_dofs];
+        for c in recording.contacts(record) {
             let at = 3 * self.loaded.candidates[c.candidate as usize] as usize;
             force[at..at + 3].copy_from_slice(&c.force_on_part.to_array());
         }
-        self.factor.solve(&force)
+        match &self.solver {
+            Solver::Full(factor) => factor.solve(&force),
+            Solver::Constrained {
+                stiffness,
+                coarse,
+                bubbles,
+            } => {
+                // u = B b + T C_1 Tᵀ (f - K B b): the rest in equilibrium with the bubbles as they were.
+                let mut of_bubbles = vec![0.0; n_dofs];
+                for (bubble, amplitude) in recording.bubbles(record) {
+                    let at = 3 * bubbles[*bubble as usize] as usize;
+                    of_bubbles[at..at + 3].copy_from_slice(&DVec3::to_array(amplitude));
+                }
+                for (f, of_bubbles) in force.iter_mut().zip(stiffness.multiply(&of_bubbles)) {
+                    *f -= of_bubbles;
+                }
+                let mut u = coarse.solve(&force);
+                for (u, of_bubbles) in u.iter_mut().zip(&of_bubbles) {
+                    *u += of_bubbles;
+                }
+                u
+            }
+        }
     }
 
     /// Von Mises stress at all nodes, Pa.

@@ -375,6 +375,47 @@ impl Accuracy {
     }
 }
 
+impl Accuracy {
+    /// The settings in a few words, for tables and reports.
+    pub fn words(&self) -> String {
+        let planes = match self.contact_iterations {
+            ContactIterations::Converged => "planes converged".to_owned(),
+            ContactIterations::Times(1) => "planes once".to_owned(),
+            ContactIterations::Times(n) => format!("planes {n} times"),
+        };
+        let scalar = match self.scalar {
+            Scalar::F64 => "f64",
+            Scalar::F32 => "f32",
+        };
+        let preset = self.preset.map(|p| format!("{}: ", p.name()));
+        format!(
+            "{}{planes}, interface nodes {}, LCP to {:e}, shape in {scalar}",
+            preset.unwrap_or_default(),
+            self.adaptive.words(),
+            self.lcp_tolerance
+        )
+    }
+}
+
+impl Adaptive {
+    /// In a few words, lengths in mm.
+    pub fn words(&self) -> String {
+        let Self::On { method, free } = self else {
+            return "all free".to_owned();
+        };
+        let which = match free {
+            FreeNodes::Radius(0.0) => "none free".to_owned(),
+            FreeNodes::Radius(radius) => format!("free within {:.3} mm", 1e3 * radius),
+            FreeNodes::Indicator(share) => format!("free where bent by {} %", 100.0 * share),
+            FreeNodes::BudgetUs(budget) => format!("free as {budget} µs allow"),
+        };
+        match method {
+            PMethod::Select => format!("{which} (select)"),
+            PMethod::Constrain => format!("{which} (constrain)"),
+        }
+    }
+}
+
 /// Bend of an edge, as a share of the largest displacement, that a picture of a thousand pixels
 /// begins to show.
 const SEEN_BEND: f64 = 1e-3;

@@ -5,6 +5,7 @@
 //! the part stays; if it holds the part, the tool stays, and contact is solved in the part's frame
 //! all the same.
 
+use std::ops::Range;
 use std::time::Instant;
 
 use device::{
@@ -25,7 +26,7 @@ use crate::{Error, interrupt};
 const DISPLAY_INTERVAL: u64 = 16;
 
 /// One recorded period.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Record {
     /// Number of the period.
     pub step: u64,
@@ -46,8 +47,8 @@ pub struct Record {
     pub step_ns: u64,
     /// ns, the surface multiply, in periods that had one.
     pub multiply_ns: Option<u64>,
-    contacts_from: usize,
-    contacts_to: usize,
+    contacts: Range<usize>,
+    bubbles: Range<usize>,
 }
 
 /// Everything a session leaves behind.
@@ -64,12 +65,19 @@ pub struct Recording {
     /// Largest displacement of a surface node, m, seen at display rate.
     pub max_surface_displacement: f64,
     contacts: Vec<ActiveContact>,
+    bubbles: Vec<(u32, DVec3)>,
 }
 
 impl Recording {
     /// Contacts that carried force in a record.
     pub fn contacts(&self, record: &Record) -> &[ActiveContact] {
-        &self.contacts[record.contacts_from..record.contacts_to]
+        &self.contacts[record.contacts.clone()]
+    }
+
+    /// Free interface nodes of a constrained part, by their number among its bubbles, and how far
+    /// they are from where they would follow, m.
+    pub fn bubbles(&self, record: &Record) -> &[(u32, DVec3)] {
+        &self.bubbles[record.bubbles.clone()]
     }
 
     /// N, along the approach direction, positive when it resists.
@@ -151,6 +159,7 @@ pub fn run(
             device: SimulatedEvents::default(),
             max_surface_displacement: 0.0,
             contacts: Vec::with_capacity(64 * n_periods as usize),
+            bubbles: Vec::new(),
         },
         shape,
     };
@@ -237,6 +246,10 @@ impl Session<'_> {
         recording
             .contacts
             .extend_from_slice(self.engine.active_contacts());
+        let bubbles_from = recording.bubbles.len();
+        recording
+            .bubbles
+            .extend_from_slice(self.engine.bubble_amplitudes());
         recording.records.push(Record {
             step: recording.records.len() as u64,
             time_s: handle.time_s,
@@ -247,8 +260,8 @@ impl Session<'_> {
             report,
             step_ns,
             multiply_ns: None,
-            contacts_from,
-            contacts_to: recording.contacts.len(),
+            contacts: contacts_from..recording.contacts.len(),
+            bubbles: bubbles_from..recording.bubbles.len(),
         });
         wrench_on_handle
     }

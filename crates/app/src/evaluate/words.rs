@@ -26,6 +26,10 @@ impl Story<'_> {
                 "steps with more near nodes than accuracy.max_contacts",
             ),
             (
+                count(&|r| r.report.switch_forced) as u64,
+                "steps in which freeing or constraining nodes changed the wrench beyond its bound",
+            ),
+            (
                 safety.samples_rejected(),
                 "poses of the device were refused",
             ),
@@ -140,9 +144,10 @@ impl Story<'_> {
                     }
                 ),
             ),
+            pair("accuracy", scene.accuracy.words()),
             pair(
-                "contact iterations",
-                format!("{:?}", scene.accuracy.contact_iterations).to_lowercase(),
+                "elements",
+                format!("order {}", self.prepared.loaded.mesh.order),
             ),
             pair(
                 "compliance",
@@ -171,13 +176,26 @@ impl Story<'_> {
     }
 
     pub(super) fn notes(&self) -> Vec<String> {
-        vec![
+        let mut notes = vec![
             "Travel is that of the held body in the simulation; the handle is ahead of it by the force \
              over the stiffness of the virtual coupling, which acts in series with the part."
                 .to_owned(),
             "Contact is frictionless and quasi-static, displacements are linear; strain and rotation are \
              the largest at the integration points."
                 .to_owned(),
-        ]
+        ];
+        let records = &self.recording.records;
+        if self.prepared.bubbles.is_some() {
+            let most_free = records.iter().map(|r| r.report.free_nodes).max();
+            let switched = records.iter().map(|r| r.report.switch_change);
+            notes.push(format!(
+                "The part's interface nodes are constrained (p-method \"constrain\"), up to {} of them were \
+                 free: it is stiffer than at its full order, at every moment. Freeing and constraining \
+                 changed the wrench by {:.1e} N in a step at most. Pictures show the constrained part.",
+                most_free.unwrap_or(0),
+                switched.fold(0.0, f64::max),
+            ));
+        }
+        notes
     }
 }

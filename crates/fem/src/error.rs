@@ -52,6 +52,36 @@ pub enum Error {
         /// " and N more", or nothing.
         more: String,
     },
+    /// An element that is valid is not so at another order.
+    #[error(
+        "element {tag} becomes inverted or flat at order {order} (smallest Jacobian {jacobian:.3e} m³{more}); \
+         ask for order = {from}, or make the mesh anew with `gmsh -order {order} -optimize_ho`, finer where it curves"
+    )]
+    OrderInvalid {
+        /// Tag in the file.
+        tag: u64,
+        /// The order asked for.
+        order: u8,
+        /// The order that the mesh has.
+        from: u8,
+        /// m³: smallest bound of the determinant of the Jacobian.
+        jacobian: f64,
+        /// "; N more are too", or nothing.
+        more: String,
+    },
+    /// A face of a group that is on no element, so that a new order or size of elements gives it
+    /// no nodes.
+    #[error(
+        "group {group:?}: the face with the corner nodes {}, {}, {} is of no element; \
+         delete it, or mesh the volume behind it",
+        tags[0], tags[1], tags[2]
+    )]
+    FaceOfNoElement {
+        /// Name of the group.
+        group: String,
+        /// Tags of the corner nodes in the file.
+        tags: [u64; 3],
+    },
     /// Nothing holds the body, or too little does.
     #[error(
         "the body is not held: free rigid motion {motions}; name a group of nodes in `fixed` that stops it"

@@ -1,9 +1,13 @@
 //! Nodes, elements and named groups.
 
 pub mod gmsh;
+mod lattice;
 mod measure;
 mod quality;
+mod raise;
+mod refine;
 mod topology;
+mod validity;
 
 use std::collections::HashMap;
 

@@ -1,0 +1,214 @@
+//! Nodes at regular places of the elements of a mesh, each once however many elements share it:
+//! what raising the order and refining have in common.
+
+use std::collections::HashMap;
+
+use super::{Face, Group, Mesh};
+use crate::Error;
+use crate::element::{FACE_VERTICES, MAX_NODES, Order};
+
+/// A place between vertices of the mesh: each vertex with its weight, in steps, by ascending
+/// vertex. Whichever element asks for a place on a shared edge or face, the key is the same.
+type Key = [(u32, u8); 4];
+
+/// Fills the unused entries of a [`Key`].
+const UNUSED: (u32, u8) = (u32::MAX, 0);
+
+/// Nodes of a mesh in the making, on the lattice of the elements of the old one.
+pub(super) struct Lattice<'a> {
+    old: &'a Mesh,
+    /// Steps of the lattice from vertex to vertex.
+    steps: u8,
+    known: HashMap<Key, u32>,
+    nodes: Vec<[f64; 3]>,
+    node_tags: Vec<u64>,
+    /// New index of each old node that stays.
+    kept: Vec<Option<u32>>,
+    next_tag: u64,
+}
+
+impl<'a> Lattice<'a> {
+    /// Begins with the old nodes that are places of the lattice, in their old sequence and with
+    /// their tags; those that are of no element are left out.
+    pub(super) fn new(old: &'a Mesh, steps: u8) -> Self {
+        let old_steps = old.order as u8;
+        let places: Vec<Option<[u8; 4]>> = weights(old.order)
+            .into_iter()
+            .map(|w| {
+                let is_place = w.iter().all(|x| x * steps % old_steps == 0);
+                is_place.then(|| w.map(|x| x * steps / old_steps))
+            })
+            .collect();
+        let mut key_of_old: Vec<Option<Key>> = vec![None; old.n_nodes()];
+        for e in 0..old.n_elements() {
+            let nodes = old.element_nodes(e);
+            for (&node, place) in nodes.iter().zip(&places) {
+                if let Some(place) = place {
+                    key_of_old[node as usize] = Some(key(&nodes[..4], place));
+                }
+            }
+        }
+        let mut lattice = Self {
+            old,
+            steps,
+            known: HashMap::with_capacity(2 * old.n_nodes()),
+            nodes: Vec::new(),
+            node_tags: Vec::new(),
+            kept: vec![None; old.n_nodes()],
+            next_tag: old.node_tags.iter().max().map_or(1, |t| t + 1),
+        };
+        for (node, key) in key_of_old.into_iter().enumerate() {
+            if let Some(key) = key {
+                let index = lattice.nodes.len() as u32;
+                lattice.known.insert(key, index);
+                lattice.kept[node] = Some(index);
+                lattice.nodes.push(old.nodes[node]);
+                lattice.node_tags.push(old.node_tags[node]);
+            }
+        }
+        lattice
+    }
+
+    /// The node at a place of an old element, made on the element's map if it is new.
+    pub(super) fn node(&mut self, element: usize, place: &[u8; 4]) -> u32 {
+        let key = key(&self.old.element_nodes(element)[..4], place);
+        if let Some(&index) = self.known.get(&key) {
+            return index;
+        }
+        let index = self.nodes.len() as u32;
+        let l = place.map(|w| f64::from(w) / f64::from(self.steps));
+        self.nodes.push(self.old.point(element, l));
+        self.node_tags.push(self.next_tag);
+        self.next_tag += 1;
+        self.known.insert(key, index);
+        index
+    }
+
+    /// The mesh of these elements. `faces` gives, for every face that takes the place of an old
+    /// one, its nodes as places on the old face; `children` how many elements take the place of
+    /// each old one, one behind the other.
+    ///
+    /// # Errors
+    /// [`Error::FaceOfNoElement`].
+    pub(super) fn into_mesh(
+        self,
+        order: Order,
+        elements: Vec<u32>,
+        element_tags: Vec<u64>,
+        faces: &[Vec<[u8; 3]>],
+        children: u32,
+    ) -> Result<Mesh, Error> {
+        let n_local = order.nodes_per_element();
+        let groups = self
+            .old
+            .groups
+            .iter()
+            .map(|old| {
+                let mut group = Group {
+                    name: old.name.clone(),
+                    dimension: old.dimension,
+                    nodes: Vec::new(),
+                    faces: Vec::with_capacity(old.faces.len() * faces.len()),
+                    elements: Vec::with_capacity(old.elements.len() * children as usize),
+                };
+                for face in &old.faces {
+                    for places in faces {
+                        group.faces.push(self.face(old, face, places)?);
+                    }
+                }
+                for &e in &old.elements {
+                    group.elements.extend(children * e..children * e + children);
+                }
+                if old.faces.is_empty() && old.elements.is_empty() {
+                    // Only nodes: those that are still there.
+                    let stay = old.nodes.iter().filter_map(|&n| self.kept[n as usize]);
+                    group.nodes.extend(stay);
+                } else {
+                    group
+                        .nodes
+                        .extend(group.faces.iter().flat_map(|f| &f.nodes));
+                    for &e in &group.elements {
+                        let first = e as usize * n_local;
+                        group.nodes.extend(&elements[first..first + n_local]);
+                    }
+                }
+                group.nodes.sort_unstable();
+                group.nodes.dedup();
+                Ok(group)
+            })
+            .collect::<Result<Vec<Group>, Error>>()?;
+        Ok(Mesh::new(
+            order,
+            self.nodes,
+            self.node_tags,
+            elements,
+            element_tags,
+            groups,
+        ))
+    }
+
+    /// The face with nodes at these places of an old face.
+    fn face(&self, group: &Group, old: &Face, places: &[[u8; 3]]) -> Result<Face, Error> {
+        let vertices = &old.nodes[..3];
+        let nodes: Option<Vec<u32>> = places
+            .iter()
+            .map(|place| self.known.get(&key(vertices, place)).copied())
+            .collect();
+        match nodes {
+            Some(nodes) => Ok(Face { nodes }),
+            None => Err(Error::FaceOfNoElement {
+                group: group.name.clone(),
+                tags: [0, 1, 2].map(|k| self.old.node_tags[vertices[k] as usize]),
+            }),
+        }
+    }
+}
+
+impl Mesh {
+    /// Where a local point of an element is, m.
+    pub(crate) fn point(&self, element: usize, l: [f64; 4]) -> [f64; 3] {
+        let (mut values, mut unused) = ([0.0; MAX_NODES], [[0.0; 4]; MAX_NODES]);
+        self.order.shape(l, &mut values, &mut unused);
+        let mut point = [0.0; 3];
+        for (&node, value) in self.element_nodes(element).iter().zip(values) {
+            for (p, x) in point.iter_mut().zip(self.nodes[node as usize]) {
+                *p += value * x;
+            }
+        }
+        point
+    }
+}
+
+/// Places of the nodes of an element of this order, in steps of 1 / order.
+pub(super) fn weights(order: Order) -> Vec<[u8; 4]> {
+    let steps = f64::from(order as u8);
+    order
+        .node_coordinates()
+        .into_iter()
+        .map(|l| l.map(|x| (steps * x).round() as u8))
+        .collect()
+}
+
+/// Places of the nodes of Gmsh's triangle of this order, in steps of 1 / order.
+pub(super) fn face_weights(order: Order) -> Vec<[u8; 3]> {
+    let weights = weights(order);
+    order
+        .face_nodes(0)
+        .into_iter()
+        .map(|node| FACE_VERTICES[0].map(|v| weights[node][v]))
+        .collect()
+}
+
+/// Key of the place that has these weights of these vertices.
+fn key(vertices: &[u32], place: &[u8]) -> Key {
+    let mut key = [UNUSED; 4];
+    let mut n = 0;
+    for (&vertex, &weight) in vertices.iter().zip(place) {
+        if weight > 0 {
+            key[n] = (vertex, weight);
+            n += 1;
+        }
+    }
+    key[..n].sort_unstable();
+    key
+}

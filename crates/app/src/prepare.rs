@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use fem::{
-    BubbleCompliance, Compliance, ComplianceChecks, FactoredStiffness, Material, Mesh, Quadrature,
-    Supports,
+    BubbleCompliance, Compliance, ComplianceChecks, FactoredStiffness, Material, Mesh, Order,
+    Quadrature, Supports,
 };
 use glam::DVec3;
 
@@ -174,12 +174,11 @@ pub fn load(spec: &PartSpec) -> Result<LoadedPart, Error> {
     if spec.length_scale != 1.0 {
         mesh.scale(spec.length_scale);
     }
-    if spec.refinements > 0
-        || spec
-            .order
-            .is_some_and(|o| usize::from(o) != mesh.order as usize)
-    {
-        return Err(Error::Input("ORDER".to_owned()));
+    for _ in 0..spec.refinements {
+        mesh = mesh.refined().map_err(|e| Error::part(path, e))?;
+    }
+    if let Some(order) = spec.order.and_then(Order::try_from_number) {
+        mesh = mesh.with_order(order).map_err(|e| Error::part(path, e))?;
     }
     let mut supports = Supports::new(mesh.n_nodes());
     for (name, components) in &spec.fixed {

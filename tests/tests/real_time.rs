@@ -79,7 +79,7 @@ fn no_step_of_an_insertion_allocates() {
         let mut touched = 0;
         for &share in in_and_out.iter().chain(&jump) {
             touched += u32::from(engine.step(&at(share)).contacts > 0);
-            shape.update(&engine).unwrap();
+            shape.update(&mut engine).unwrap();
         }
         let after = ALLOCATIONS.load(Ordering::Relaxed);
         assert!(touched > 100, "{name}: contact in {touched} steps only");

@@ -82,7 +82,7 @@ fn measure(mesh: &str, name: &str, order: u8, adaptive: Adaptive) {
             let begun = Instant::now();
             let report = engine.step(&target);
             let stepped = begun.elapsed();
-            shape.update(&engine).unwrap();
+            shape.update(&mut engine).unwrap();
             let all = begun.elapsed();
             // The first round warms up.
             if round > 0 && report.contacts > 0 {

@@ -30,7 +30,7 @@ use crate::free_nodes::LOOSE_RADIUS;
 use constrained::Constrained;
 pub use constrained::{BubbleData, FreeSettings};
 pub use part::ContactPart;
-use part::{Bubbles, Deformed};
+use part::Deformed;
 pub use report::{ActiveContact, N_STAGES, Stage, StepReport};
 use scratch::Scratch;
 pub use switch::switch_bound;
@@ -151,12 +151,8 @@ impl Engine {
         let mut engine = Self::new(part, tool, coupling, settings)?;
         let n_candidates = engine.part.n_candidates();
         let max_rows = engine.scratch.max_rows();
-        engine.constrained = Some(Box::new(Constrained::new(
-            bubbles,
-            free,
-            n_candidates,
-            max_rows,
-        )));
+        let constrained = Constrained::new(bubbles, free, n_candidates, max_rows);
+        engine.constrained = Some(Box::new(constrained));
         Ok(engine)
     }
 
@@ -204,14 +200,31 @@ impl Engine {
     }
 
     /// Displacement of candidate `candidate_idx` under the contact forces of the last step, m.
-    pub fn displacement(&self, candidate_idx: usize) -> DVec3 {
-        deformed(&self.part, &self.scratch, &self.constrained).displacement(candidate_idx)
+    pub fn displacement(&mut self, candidate_idx: usize) -> DVec3 {
+        if let Some(constrained) = &mut self.constrained {
+            constrained.make_terms(&self.scratch.active);
+        }
+        self.deformed().displacement(candidate_idx)
     }
 
-    /// Bubbles that are added to the compliance's displacement in the last state, and their amplitudes
-    /// (m); empty where no interface node is constrained.
-    pub fn bubble_amplitudes(&self) -> &[(u32, DVec3)] {
-        bubbles_of(&self.constrained).terms
+    /// In a constrained part, free interface nodes by their number among the bubbles, and how far each
+    /// is from where it would follow (m), after the last step; empty otherwise.
+    pub fn bubble_amplitudes(&mut self) -> &[(u32, DVec3)] {
+        match &mut self.constrained {
+            None => &[],
+            Some(constrained) => {
+                constrained.make_terms(&self.scratch.active);
+                constrained.terms()
+            }
+        }
+    }
+
+    fn deformed(&self) -> Deformed<'_> {
+        Deformed {
+            part: &self.part,
+            active: &self.scratch.active,
+            constrained: self.constrained.as_deref(),
+        }
     }
 
     /// One step. `target`: pose of the tool that the handle asks for, in the part's frame.
@@ -291,7 +304,33 @@ impl Engine {
         let tool = &self.tool;
         let pose = *tool_pose;
         let near_distance = self.settings.near_distance;
-        let bubbles = bubbles_of(&self.constrained);
+
+        // Which candidates can be near: a list that stays valid over many passes and steps.
+        if let Some(constrained) = &mut self.constrained {
+            let active = &self.scratch.active;
+            let state = state_of(part, tool, tool_pose, &self.scratch, Some(constrained));
+            if self.watch_list.is_stale(state) {
+                constrained.make_terms(active);
+            }
+        }
+        let state = state_of(
+            part,
+            tool,
+            tool_pose,
+            &self.scratch,
+            self.constrained.as_deref(),
+        );
+        let candidates = self.watch_list.update(state, near_distance);
+        if let Some(constrained) = &mut self.constrained {
+            let active = &self.scratch.active;
+            if !constrained.ensure(candidates.iter().copied(), active, part) {
+                constrained.make_terms(active);
+            }
+        }
+        clock.lap(Stage::Proximity, report);
+
+        // One plane per near node, at its displaced position (paper, Fig. 3).
+        let constrained = self.constrained.as_deref();
         let planes_of = |candidates: &[u32],
                          active: &[ActiveContact],
                          max_gap: f64,
@@ -299,7 +338,7 @@ impl Engine {
             let deformed = Deformed {
                 part,
                 active,
-                bubbles,
+                constrained,
             };
             let position_of = |candidate: u32| {
                 let i = candidate as usize;
@@ -308,27 +347,7 @@ impl Engine {
             planes_into(tool, &pose, candidates, position_of, max_gap, planes)
         };
 
-        // Which candidates can be near: a list that stays valid over many passes and steps.
-        let Scratch {
-            planes,
-            active,
-            was_active,
-            ..
-        } = &mut self.scratch;
-        let state = State {
-            deformed: Deformed {
-                part,
-                active,
-                bubbles,
-            },
-            tool,
-            tool_pose,
-            is_active: was_active,
-        };
-        let candidates = self.watch_list.update(state, near_distance);
-        clock.lap(Stage::Proximity, report);
-
-        // One plane per near node, at its displaced position (paper, Fig. 3).
+        let Scratch { planes, active, .. } = &mut self.scratch;
         let left_out = planes_of(candidates, active, near_distance, planes);
         report.dropped = (left_out.n_beyond_capacity + left_out.n_invalid) as u32;
         self.scratch.keep_seen(|missing, active, extra| {
@@ -369,12 +388,16 @@ impl Engine {
                 .coupling_compliance
                 .as_ref()
                 .map(|matrix| CouplingCompliance { matrix, reference });
-            let assembled = delassus_into(part, planes, coupling, &mut w_matrix[..m * m]);
+            let w = &mut w_matrix[..m * m];
+            let assembled = match &mut self.constrained {
+                None => delassus_into(part, planes, coupling, w),
+                Some(constrained) => {
+                    let candidates = planes.iter().map(|plane| plane.candidate);
+                    constrained.ensure(candidates, &[], part);
+                    delassus_into(constrained.blocks(), planes, coupling, w)
+                }
+            };
             debug_assert!(assembled.is_ok(), "the matrix has the size of the planes");
-            if let Some(constrained) = &mut self.constrained {
-                constrained.ensure(planes);
-                constrained.add_to_delassus(planes, &mut w_matrix[..m * m]);
-            }
         }
         clock.lap(Stage::Delassus, report);
 
@@ -389,7 +412,7 @@ impl Engine {
         // Forces of the near nodes become the state; the tool goes where its coupling balances.
         self.scratch.adopt_forces(m);
         if let Some(constrained) = &mut self.constrained {
-            constrained.adopt_forces(&self.scratch.active);
+            constrained.forget_terms();
         }
         let (force, torque) = wrench_on_tool(&self.scratch.planes, &self.scratch.z[..m], reference);
         report.contact_wrench_on_tool = [force.x, force.y, force.z, torque.x, torque.y, torque.z];
@@ -405,7 +428,7 @@ impl Engine {
         let mut change = (moved.translation - tool_pose.translation).length()
             + self.reach_of_rotation * moved.rotation.angle_between(tool_pose.rotation);
         *tool_pose = moved;
-        let deformed = deformed(&self.part, &self.scratch, &self.constrained);
+        let deformed = self.deformed();
         for (plane, before) in self.scratch.planes.iter().zip(&self.scratch.u_before) {
             let u = deformed.displacement(plane.candidate as usize);
             change = change.max((u - *before).length());
@@ -427,21 +450,22 @@ impl Engine {
     }
 }
 
-fn bubbles_of(constrained: &Option<Box<Constrained>>) -> Bubbles<'_> {
-    constrained
-        .as_ref()
-        .map_or(Bubbles::default(), |constrained| constrained.bubbles())
-}
-
-fn deformed<'a>(
+fn state_of<'a>(
     part: &'a ContactPart,
+    tool: &'a Tool,
+    tool_pose: &'a DPose3,
     scratch: &'a Scratch,
-    constrained: &'a Option<Box<Constrained>>,
-) -> Deformed<'a> {
-    Deformed {
-        part,
-        active: &scratch.active,
-        bubbles: bubbles_of(constrained),
+    constrained: Option<&'a Constrained>,
+) -> State<'a> {
+    State {
+        deformed: Deformed {
+            part,
+            active: &scratch.active,
+            constrained,
+        },
+        tool,
+        tool_pose,
+        is_active: &scratch.was_active,
     }
 }
 

@@ -107,7 +107,8 @@ impl FreeNodes {
     /// Does not allocate.
     pub(crate) fn sweep(&mut self, contacts: &[DVec3], bend: impl Fn(usize) -> f64, largest: f64) {
         let n = self.positions.len();
-        if contacts.is_empty() || n == 0 {
+        let is_idle = self.n_free == 0 && (self.max_free == 0 || self.rule == Rule::Radius(0.0));
+        if contacts.is_empty() || n == 0 || is_idle {
             return;
         }
         for _ in 0..self.slice {

@@ -85,7 +85,7 @@ impl Shape {
     ///
     /// # Errors
     /// Those of the multiply, which an engine's state does not give.
-    pub fn update(&mut self, engine: &Engine) -> Result<&[f64], Error> {
+    pub fn update(&mut self, engine: &mut Engine) -> Result<&[f64], Error> {
         let contacts = engine.active_contacts();
         self.columns.clear();
         self.forces.clear();

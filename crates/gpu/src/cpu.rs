@@ -143,16 +143,20 @@ impl<T: Stored> Multiply for Cpu<T> {
         }
         self.add_first(columns, forces, &mut displacement[..3 * n_first]);
         for &row in rows {
-            let at = 3 * row as usize;
-            let mut u = [0.0; 3];
-            for (&candidate, f) in columns.iter().zip(forces.chunks_exact(3)) {
-                for (column, f) in self.columns_of(candidate).into_iter().zip(f) {
-                    for (u, c) in u.iter_mut().zip(&column[at..at + 3]) {
-                        *u += c.to_f64() * (f * self.unit);
-                    }
+            displacement[3 * row as usize..][..3].fill(0.0);
+        }
+        // Candidate by candidate: its three columns stay at hand, and rows do not wait for each other.
+        for (&candidate, f) in columns.iter().zip(forces.chunks_exact(3)) {
+            let [a, b, c] = self.columns_of(candidate);
+            let [x, y, z] = [f[0], f[1], f[2]].map(|f| f * self.unit);
+            for &row in rows {
+                let at = 3 * row as usize;
+                let sums = &mut displacement[at..at + 3];
+                let (a, b, c) = (&a[at..at + 3], &b[at..at + 3], &c[at..at + 3]);
+                for k in 0..3 {
+                    sums[k] += a[k].to_f64() * x + b[k].to_f64() * y + c[k].to_f64() * z;
                 }
             }
-            displacement[at..at + 3].copy_from_slice(&u);
         }
         Ok(())
     }

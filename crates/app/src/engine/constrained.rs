@@ -20,17 +20,17 @@
 //! the coarse space is the usual one of hierarchical bases (Szabo and Babuska 1991).
 
 mod operator;
+mod pairs;
 
 use std::time::Instant;
 
-use bytemuck::cast_slice;
-use contact::plane::Plane;
+use contact::delassus::ComplianceBlocks;
 use glam::{DMat3, DVec3};
 
-use super::ActiveContact;
-use super::part::Bubbles;
+use super::{ActiveContact, ContactPart};
 use crate::free_nodes::{FreeNodes, Rule};
 use operator::{FreeOperator, dot};
+use pairs::Pairs;
 
 /// Steps in which every bubble is looked at once: at 1 kHz one picture of the display.
 const SWEEP: usize = 16;
@@ -40,6 +40,12 @@ const BUILD_STEPS: usize = 20;
 
 /// Least work in a step of building, multiply-adds: a few microseconds.
 const LEAST_WORK: usize = 20_000;
+
+/// Most work in a step of building, multiply-adds, about 100 µs; larger sets take more steps.
+const MOST_WORK: usize = 400_000;
+
+/// Candidates whose blocks are kept.
+const MOST_KNOWN: usize = 512;
 
 /// What the step needs to know of the bubbles of a part. Blocks are 3 x 3, column-major inside.
 #[derive(Clone, Debug)]
@@ -66,9 +72,8 @@ pub struct FreeSettings {
 /// that is large already. The nearest are freed.
 const MOST_FREE: usize = 400;
 
-/// Rows and passes that a time budget is reckoned with.
+/// Near candidates that a time budget is reckoned with.
 const TYPICAL_ROWS: usize = 32;
-const TYPICAL_PASSES: usize = 3;
 
 impl FreeSettings {
     /// Those within this distance of a contact at rest, m.
@@ -121,9 +126,10 @@ impl FreeSettings {
 fn work_of_step(n_free: usize) -> f64 {
     let rows = 3.0 * n_free as f64;
     let m = TYPICAL_ROWS as f64;
-    let pass = rows * rows / 2.0 + m * m * rows / 2.0 + 9.0 * m * rows;
+    // A candidate that comes near, and another set in the making.
+    let comes_near = 3.0 * rows * rows / 2.0 + 9.0 * m * rows;
     let build = (rows * rows * rows / 6.0 + 3.0 * m * rows * rows / 2.0) / BUILD_STEPS as f64;
-    TYPICAL_PASSES as f64 * pass + build
+    comes_near + build.clamp(LEAST_WORK as f64, MOST_WORK as f64)
 }
 
 /// What happens with the free set.
@@ -145,8 +151,11 @@ pub(super) struct Constrained {
     stage: Stage,
     now: FreeOperator,
     next: FreeOperator,
+    /// Blocks of the blended compliance, G_0 included, between candidates that are or were near.
+    blended: Pairs,
     /// Bubbles that are free in either operator, and their amplitudes in the last state, m.
     terms: Vec<(u32, DVec3)>,
+    has_terms: bool,
     /// By bubble: its place in `terms`, or `u32::MAX`.
     term_of: Vec<u32>,
     blend: f64,
@@ -156,8 +165,6 @@ pub(super) struct Constrained {
     /// Candidates whose columns the next operator will need at once.
     needed: Vec<u32>,
     work_per_step: usize,
-    /// By row of the LCP: L⁻¹ Rᵀ n of both operators, one after the other.
-    seen: Vec<f64>,
 }
 
 impl Constrained {
@@ -169,20 +176,22 @@ impl Constrained {
     ) -> Self {
         let n_bubbles = data.positions.len();
         let max_free = settings.max_free.min(n_bubbles);
-        let operator = || FreeOperator::new(n_candidates, n_bubbles, max_free);
+        let capacity = n_candidates.min(MOST_KNOWN.max(max_rows));
+        let operator = || FreeOperator::new(n_candidates, capacity, n_bubbles, max_free);
         Self {
             free: FreeNodes::new(settings.rule, max_free, data.positions.clone(), SWEEP),
             stage: Stage::Steady,
             now: operator(),
             next: operator(),
+            blended: Pairs::new(n_candidates, capacity),
             terms: Vec::with_capacity(n_bubbles),
+            has_terms: true,
             term_of: vec![u32::MAX; n_bubbles],
             blend: 0.0,
             switched: 0.0,
             wanted: Vec::with_capacity(n_bubbles),
             needed: Vec::with_capacity(n_candidates),
             work_per_step: LEAST_WORK,
-            seen: vec![0.0; max_rows * 6 * max_free],
             data,
         }
     }
@@ -193,6 +202,8 @@ impl Constrained {
         self.stage = Stage::Steady;
         self.now.clear();
         self.next.clear();
+        self.blended.clear();
+        self.has_terms = true;
         self.terms.clear();
         self.term_of.fill(u32::MAX);
         self.blend = 0.0;
@@ -217,9 +228,19 @@ impl Constrained {
     }
 
     /// Moves the blend; at 1 the next operator is the one of now.
-    pub(super) fn set_blend(&mut self, blend: f64) {
+    pub(super) fn set_blend(&mut self, blend: f64, part: &ContactPart) {
         self.switched += (blend - self.blend).abs();
         self.blend = blend;
+        for &candidate in self.blended.known() {
+            self.next.ensure(&self.data, candidate);
+        }
+        let (now, next) = (&self.now, &self.next);
+        self.blended.refill(|i, j| {
+            *part.block(i as usize, j as usize)
+                + (1.0 - blend) * now.block(i, j)
+                + blend * next.block(i, j)
+        });
+        self.has_terms = false;
     }
 
     /// Ends a ramp whose blend is 1.
@@ -229,22 +250,52 @@ impl Constrained {
         self.stage = Stage::Steady;
     }
 
-    /// The bubbles of the last state.
-    pub(super) fn bubbles(&self) -> Bubbles<'_> {
-        Bubbles {
-            coupling: cast_slice::<f64, DMat3>(&self.data.coupling),
-            n_bubbles: self.data.positions.len(),
-            terms: &self.terms,
-            switched: self.switched,
+    /// Full switches of the operator since the start, each no more than the whole compliance.
+    pub(super) fn switched(&self) -> f64 {
+        self.switched
+    }
+
+    /// Displacement of candidate `i` under contacts whose candidates are known, m.
+    #[inline]
+    pub(super) fn displacement(
+        &self,
+        i: usize,
+        part: &ContactPart,
+        active: &[ActiveContact],
+    ) -> DVec3 {
+        if let Some(row) = self.blended.slot(i as u32) {
+            let of_contact = |c: &ActiveContact| {
+                let slot = self.blended.slot(c.candidate).unwrap_or(row);
+                *self.blended.at(row, slot) * c.force_on_part
+            };
+            return active.iter().map(of_contact).sum();
         }
+        debug_assert!(self.has_terms, "amplitudes are made before they are used");
+        let mut u = part.displacement(i, active);
+        let n_bubbles = self.data.positions.len();
+        for &(bubble, amplitude) in &self.terms {
+            let at = 9 * (i * n_bubbles + bubble as usize);
+            u += DMat3::from_cols_slice(&self.data.coupling[at..at + 9]) * amplitude;
+        }
+        u
+    }
+
+    /// Compliance between candidates that are known.
+    pub(super) fn blocks(&self) -> &impl ComplianceBlocks {
+        &self.blended
+    }
+
+    /// Bubbles and their amplitudes after [`Self::make_terms`], m.
+    pub(super) fn terms(&self) -> &[(u32, DVec3)] {
+        &self.terms
     }
 
     /// One step of choosing and building. `contacts`: rest positions of what is (nearly) in contact;
-    /// `near`: candidates that have a plane; `active`: forces of the last step.
+    /// `near`: candidates that are watched; `active`: forces of the last step.
     pub(super) fn advance(
         &mut self,
         contacts: &[DVec3],
-        near: impl Iterator<Item = u32>,
+        near: &[u32],
         active: &[ActiveContact],
         largest: f64,
     ) {
@@ -276,6 +327,8 @@ impl Constrained {
                 {
                     self.stage = Stage::Ramp;
                     self.blend = 0.0;
+                    // Only what is near now will be blended.
+                    self.blended.clear();
                 }
             }
             Stage::Ramp => {}
@@ -283,7 +336,7 @@ impl Constrained {
     }
 
     /// Begins a switch if the chosen set is another one than the operator's.
-    fn begin_build(&mut self, near: impl Iterator<Item = u32>) {
+    fn begin_build(&mut self, near: &[u32]) {
         let is_free = self.free.is_free();
         let same = self.now.n_free() == self.free.n_free()
             && self.now.bubbles().iter().all(|b| is_free[*b as usize]);
@@ -299,75 +352,80 @@ impl Constrained {
             (0..is_free.len() as u32).filter(|b| is_free[*b as usize] && !self.now.has(*b)),
         );
         self.needed.clear();
-        self.needed.extend(near);
+        self.needed.extend_from_slice(near);
         let kept = self.next.begin(&self.now, &self.wanted);
         debug_assert!(kept <= n_stay);
         let rows = 3 * self.wanted.len();
         let factor = (rows * rows * rows - (3 * kept).pow(3)) / 6;
         let columns = self.needed.len() * 3 * rows * rows / 2;
-        self.work_per_step = ((factor + columns) / BUILD_STEPS).max(LEAST_WORK);
+        let work = (factor + columns) / BUILD_STEPS;
+        self.work_per_step = work.clamp(LEAST_WORK, MOST_WORK);
         self.stage = Stage::Build;
     }
 
-    /// Makes what planes of these candidates need: columns of the operators, a few microseconds each
-    /// for a candidate that was far until now.
-    pub(super) fn ensure(&mut self, planes: &[Plane]) {
-        for plane in planes {
-            self.now.ensure(&self.data, plane.candidate);
-            if self.stage == Stage::Ramp {
-                self.next.ensure(&self.data, plane.candidate);
-            }
+    /// Makes the blocks between these candidates, those in contact and those that are known: some tens
+    /// of microseconds for one that was far until now. False if there was no room for all; the
+    /// displacement of the others needs [`Self::make_terms`].
+    pub(super) fn ensure(
+        &mut self,
+        candidates: impl Iterator<Item = u32> + Clone,
+        active: &[ActiveContact],
+        part: &ContactPart,
+    ) -> bool {
+        let all = active.iter().map(|c| c.candidate).chain(candidates);
+        let is_new = |c: &u32| self.blended.slot(*c).is_none();
+        let n_new = all.clone().filter(is_new).count();
+        if n_new == 0 {
+            return true;
         }
+        let has_room = n_new <= self.blended.n_left();
+        if !has_room {
+            // A long way was slid: what was near then makes room.
+            self.blended.clear();
+            self.now.clear_columns();
+            self.next.clear_columns();
+        }
+        let is_ramp = self.stage == Stage::Ramp;
+        for j in all {
+            if self.blended.slot(j).is_some() || self.blended.n_left() == 0 {
+                continue;
+            }
+            self.now.ensure(&self.data, j);
+            if is_ramp {
+                self.next.ensure(&self.data, j);
+            }
+            let (now, next, blend) = (&self.now, &self.next, self.blend);
+            self.blended.push(j, |_, i| {
+                let of_next = if is_ramp {
+                    blend * next.block(i, j)
+                } else {
+                    DMat3::ZERO
+                };
+                *part.block(i as usize, j as usize) + (1.0 - blend) * now.block(i, j) + of_next
+            });
+        }
+        has_room
     }
 
-    /// Adds the bubbles' share to the Delassus operator of the planes, m x m, both triangles.
-    pub(super) fn add_to_delassus(&mut self, planes: &[Plane], w: &mut [f64]) {
-        let m = planes.len();
-        let (n_now, n_next) = (3 * self.now.n_free(), self.n_next());
-        let stride = n_now + n_next;
-        let (share_now, share_next) = ((1.0 - self.blend).sqrt(), self.blend.sqrt());
-        for (plane, seen) in planes.iter().zip(self.seen.chunks_exact_mut(stride.max(1))) {
-            let (of_now, of_next) = seen.split_at_mut(n_now);
-            self.now
-                .column_along(plane.candidate, share_now * plane.normal, of_now);
-            if n_next > 0 {
-                self.next
-                    .column_along(plane.candidate, share_next * plane.normal, of_next);
-            }
-        }
-        if stride == 0 {
+    /// Notes that forces have changed.
+    pub(super) fn forget_terms(&mut self) {
+        self.has_terms = false;
+    }
+
+    /// Amplitudes of the bubbles under these contacts.
+    pub(super) fn make_terms(&mut self, active: &[ActiveContact]) {
+        if self.has_terms {
             return;
         }
-        for j in 0..m {
-            let of_j = &self.seen[j * stride..][..stride];
-            for i in 0..=j {
-                let entry = w[j * m + i] + dot(&self.seen[i * stride..][..stride], of_j);
-                w[j * m + i] = entry;
-                w[i * m + j] = entry;
-            }
-        }
-    }
-
-    /// Rows of the next operator that count: none before its ramp.
-    fn n_next(&self) -> usize {
-        if self.stage == Stage::Ramp {
-            3 * self.next.n_free()
-        } else {
-            0
-        }
-    }
-
-    /// Amplitudes of the bubbles under these contacts. Every contact's candidate had a plane.
-    pub(super) fn adopt_forces(&mut self, active: &[ActiveContact]) {
+        self.has_terms = true;
         for (bubble, _) in self.terms.drain(..) {
             self.term_of[bubble as usize] = u32::MAX;
         }
         if active.is_empty() {
             return;
         }
-        let share = 1.0 - self.blend;
         let operators = [
-            (share, &mut self.now, true),
+            (1.0 - self.blend, &mut self.now, true),
             (self.blend, &mut self.next, self.stage == Stage::Ramp),
         ];
         for (share, operator, counts) in operators {

@@ -5,6 +5,7 @@ use contact::delassus::ComplianceBlocks;
 use glam::{DMat3, DVec3};
 
 use super::ActiveContact;
+use super::constrained::Constrained;
 
 /// Candidate nodes and the compliance of the part as the step reads it.
 #[derive(Debug)]
@@ -101,37 +102,28 @@ impl ContactPart {
 pub(super) struct Deformed<'a> {
     pub(super) part: &'a ContactPart,
     pub(super) active: &'a [ActiveContact],
-    /// Displacement of each candidate per bubble, and the bubbles that are not zero; empty without
-    /// the constrained p-method.
-    pub(super) bubbles: Bubbles<'a>,
-}
-
-/// Bubbles that are added to the displacement of [`ContactPart`].
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Bubbles<'a> {
-    /// Block of candidate i and bubble j at `i n_bubbles + j`.
-    pub(super) coupling: &'a [DMat3],
-    pub(super) n_bubbles: usize,
-    /// Bubble and its amplitude, m.
-    pub(super) terms: &'a [(u32, DVec3)],
-    /// Full switches of the operator since the start, each no more than the whole compliance.
-    pub(super) switched: f64,
+    /// Where interface nodes are constrained, `part` is the coarse one.
+    pub(super) constrained: Option<&'a Constrained>,
 }
 
 impl Deformed<'_> {
     /// Displacement of candidate `i`, m.
     #[inline]
     pub(super) fn displacement(&self, i: usize) -> DVec3 {
-        let mut u = self.part.displacement(i, self.active);
-        for &(bubble, amplitude) in self.bubbles.terms {
-            u += self.bubbles.coupling[i * self.bubbles.n_bubbles + bubble as usize] * amplitude;
+        match self.constrained {
+            None => self.part.displacement(i, self.active),
+            Some(constrained) => constrained.displacement(i, self.part, self.active),
         }
-        u
     }
 
     /// Upper bound on the displacement of any candidate, m.
     pub(super) fn displacement_bound(&self) -> f64 {
         self.part.displacement_bound(self.active)
+    }
+
+    /// Full switches of the compliance since the start, each no more than all of it.
+    pub(super) fn switched(&self) -> f64 {
+        self.constrained.map_or(0.0, Constrained::switched)
     }
 }
 

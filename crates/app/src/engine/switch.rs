@@ -1,6 +1,6 @@
 //! Switching free nodes without a step of the hand's force: choose, build, ramp.
 
-use super::{ActiveContact, Engine, Stage, StageClock, StepReport};
+use super::{Engine, Stage, StageClock, StepReport};
 
 /// Largest rise of the blend in one step: a ramp takes 20 steps or more.
 const MAX_RISE: f64 = 0.05;
@@ -45,8 +45,17 @@ impl Engine {
             let soon = self.watch_list.watched().iter();
             scratch.centres.extend(soon.map(|c| rest[*c as usize]));
         }
-        let largest = largest_displacement(constrained, &self.part, &scratch.active);
-        let near = scratch.planes.iter().map(|plane| plane.candidate);
+        let deformed = super::Deformed {
+            part: &self.part,
+            active: &scratch.active,
+            constrained: Some(constrained),
+        };
+        let largest = scratch
+            .active
+            .iter()
+            .map(|c| deformed.displacement(c.candidate as usize).length())
+            .fold(0.0, f64::max);
+        let near = self.watch_list.watched();
         constrained.advance(&scratch.centres, near, &scratch.active, largest);
         clock.lap(Stage::FreeNodes, report);
         if constrained.is_ramping() {
@@ -109,8 +118,7 @@ impl Engine {
 
     fn set_blend(&mut self, blend: f64) {
         if let Some(constrained) = &mut self.constrained {
-            constrained.set_blend(blend);
-            constrained.adopt_forces(&self.scratch.active);
+            constrained.set_blend(blend, &self.part);
         }
     }
 
@@ -119,21 +127,4 @@ impl Engine {
             constrained.finish_ramp();
         }
     }
-}
-
-/// m, of the nodes that carry force.
-fn largest_displacement(
-    constrained: &super::Constrained,
-    part: &super::ContactPart,
-    active: &[ActiveContact],
-) -> f64 {
-    let deformed = super::Deformed {
-        part,
-        active,
-        bubbles: constrained.bubbles(),
-    };
-    active
-        .iter()
-        .map(|c| deformed.displacement(c.candidate as usize).length())
-        .fold(0.0, f64::max)
 }

@@ -65,6 +65,11 @@ impl WatchList {
         self.narrow.pose = None;
     }
 
+    /// Whether the next [`Self::update`] will ask for the displacement of candidates that are far.
+    pub(super) fn is_stale(&self, state: State<'_>) -> bool {
+        self.narrow.is_stale(state)
+    }
+
     /// The candidates that may be nearer than `reach` (m) to the tool. Does not allocate.
     pub(super) fn update(&mut self, state: State<'_>, reach: f64) -> &[u32] {
         if self.narrow.is_stale(state) {
@@ -141,11 +146,7 @@ impl List {
 
     /// Bound on the change of any candidate's displacement since the list was made, m.
     fn change_bound(&self, state: State<'_>) -> f64 {
-        let Deformed {
-            part,
-            active,
-            bubbles,
-        } = state.deformed;
+        let Deformed { part, active, .. } = state.deformed;
         let changed: f64 = active
             .iter()
             .map(|c| {
@@ -160,7 +161,7 @@ impl List {
             .map(|c| part.largest_block(*c) * self.force_then[*c as usize].length())
             .sum();
         // The compliance itself changes by no more than all of it while free nodes are switched.
-        let switched = (bubbles.switched - self.switched_then).min(1.0);
+        let switched = (state.deformed.switched() - self.switched_then).min(1.0);
         let by_switch: f64 = if switched > 0.0 {
             let then = self.active_then.iter();
             then.map(|c| part.largest_block(*c) * self.force_then[*c as usize].length())
@@ -193,7 +194,7 @@ impl List {
             self.active_then.push(contact.candidate);
         }
         self.pose = Some(*state.tool_pose);
-        self.switched_then = state.deformed.bubbles.switched;
+        self.switched_then = state.deformed.switched();
     }
 }
 
@@ -202,7 +203,6 @@ mod tests {
     use contact::tool::Sphere;
 
     use super::super::ActiveContact;
-    use super::super::part::Bubbles;
     use super::*;
 
     /// Nodes on a grid, each on its own spring of 1000 N/m; a sphere and forces wander at random.
@@ -253,7 +253,7 @@ mod tests {
                 deformed: Deformed {
                     part: &part,
                     active: &active,
-                    bubbles: Bubbles::default(),
+                    constrained: None,
                 },
                 tool: &tool,
                 tool_pose: &pose,

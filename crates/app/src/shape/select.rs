@@ -16,7 +16,7 @@ use crate::scene;
 const BLEND_UPDATES: f64 = 5.0;
 
 /// Updates in which every node is looked at once.
-const SWEEP: usize = 4;
+const SWEEP: usize = 8;
 
 /// Contacts that a time budget is reckoned with.
 const TYPICAL_CONTACTS: usize = 16;
@@ -154,14 +154,18 @@ impl Select {
             largest,
         );
 
-        for (place, row) in self.row_of.iter().enumerate() {
-            let drawn = match place.checked_sub(n_principal) {
-                None => DVec3::from_slice(&u[3 * place..][..3]),
-                Some(k) => match self.exact[k] {
-                    0.0 => interpolated(k),
-                    1.0 => exact_at(k),
-                    share => interpolated(k).lerp(exact_at(k), share),
-                },
+        let (principal, interface) = self.row_of.split_at(n_principal);
+        for (u, row) in u.chunks_exact(3).zip(principal) {
+            displacement[3 * *row as usize..][..3].copy_from_slice(u);
+        }
+        for (k, row) in interface.iter().enumerate() {
+            let share = self.exact[k];
+            let drawn = if share == 0.0 {
+                interpolated(k)
+            } else if share == 1.0 {
+                exact_at(k)
+            } else {
+                interpolated(k).lerp(exact_at(k), share)
             };
             displacement[3 * *row as usize..][..3].copy_from_slice(&drawn.to_array());
         }

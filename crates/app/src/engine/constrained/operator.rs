@@ -1,8 +1,10 @@
-//! One set of free bubbles: the Cholesky factor of its Σ and the columns L⁻¹ Rᵀ of candidates.
+//! One set of free bubbles: the Cholesky factor of its Σ, the columns L⁻¹ Rᵀ of candidates that were
+//! near, and the blocks R Σ⁻¹ Rᵀ between them.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use super::BubbleData;
+use super::pairs::Pairs;
 use crate::engine::ActiveContact;
 
 /// Σ_FF = L Lᵀ for the free bubbles F, appended row by row; memory for `max_free` of them.
@@ -15,16 +17,23 @@ pub(super) struct FreeOperator {
     /// L by rows, each `stride` long.
     factor: Vec<f64>,
     stride: usize,
-    /// By candidate and axis: L⁻¹ R_Fᵀ e, `stride` long.
+    /// By slot and axis: L⁻¹ R_Fᵀ e, `stride` long.
     columns: Vec<f64>,
-    has_column: Vec<bool>,
+    /// R_F Σ_FF⁻¹ R_Fᵀ between the candidates that have columns.
+    pairs: Pairs,
     next_needed: usize,
     /// Σ_FF⁻¹ R_Fᵀ f of the last state, m.
     amplitude: Vec<f64>,
 }
 
 impl FreeOperator {
-    pub(super) fn new(n_candidates: usize, n_bubbles: usize, max_free: usize) -> Self {
+    /// `capacity`: candidates that can have columns.
+    pub(super) fn new(
+        n_candidates: usize,
+        capacity: usize,
+        n_bubbles: usize,
+        max_free: usize,
+    ) -> Self {
         let stride = 3 * max_free;
         Self {
             bubbles: Vec::with_capacity(max_free),
@@ -32,8 +41,8 @@ impl FreeOperator {
             target: Vec::with_capacity(max_free),
             factor: vec![0.0; stride * stride],
             stride,
-            columns: vec![0.0; 3 * n_candidates * stride],
-            has_column: vec![false; n_candidates],
+            columns: vec![0.0; 3 * capacity * stride],
+            pairs: Pairs::new(n_candidates, capacity),
             next_needed: 0,
             amplitude: vec![0.0; stride],
         }
@@ -44,8 +53,21 @@ impl FreeOperator {
             self.is_in[bubble as usize] = false;
         }
         self.target.clear();
-        self.has_column.fill(false);
+        self.pairs.clear();
         self.next_needed = 0;
+    }
+
+    /// Forgets the columns, not the factor.
+    pub(super) fn clear_columns(&mut self) {
+        self.pairs.clear();
+    }
+
+    /// R_F Σ_FF⁻¹ R_Fᵀ of two candidates that have columns.
+    pub(super) fn block(&self, i: u32, j: u32) -> DMat3 {
+        match (self.pairs.slot(i), self.pairs.slot(j)) {
+            (Some(i), Some(j)) => *self.pairs.at(i, j),
+            _ => DMat3::ZERO,
+        }
     }
 
     pub(super) fn n_free(&self) -> usize {
@@ -85,9 +107,7 @@ impl FreeOperator {
         while done < work {
             let rows = 3 * self.bubbles.len();
             if let Some(&bubble) = self.target.get(self.bubbles.len()) {
-                for axis in 0..3 {
-                    self.append_row(data, bubble, axis);
-                }
+                self.append_rows(data, bubble);
                 self.bubbles.push(bubble);
                 self.is_in[bubble as usize] = true;
                 done += 3 * rows * rows / 2 + 1;
@@ -102,77 +122,95 @@ impl FreeOperator {
         false
     }
 
-    /// The next row of L: L x = Σ[F, row], diagonal by what is left.
-    fn append_row(&mut self, data: &BubbleData, bubble: u32, axis: usize) {
+    /// The next three rows of L: L x = Σ[F, row], diagonal by what is left.
+    fn append_rows(&mut self, data: &BubbleData, bubble: u32) {
         let n = 3 * data.positions.len();
-        let row = 3 * self.bubbles.len() + axis;
-        let column = &data.sigma[(3 * bubble as usize + axis) * n..][..n];
-        let (above, below) = self.factor.split_at_mut(row * self.stride);
-        let x = &mut below[..=row];
-        for (k, &other) in self.bubbles.iter().chain([&bubble]).enumerate() {
-            for c in 0..3 {
-                if 3 * k + c <= row {
-                    x[3 * k + c] = column[3 * other as usize + c];
-                }
+        let first = 3 * self.bubbles.len();
+        let (above, below) = self.factor.split_at_mut(first * self.stride);
+        let mut rows = below.chunks_exact_mut(self.stride);
+        let (Some(x), Some(y), Some(z)) = (rows.next(), rows.next(), rows.next()) else {
+            return;
+        };
+        let mut rows = [x, y, z];
+        for (axis, row) in rows.iter_mut().enumerate() {
+            let column = &data.sigma[(3 * bubble as usize + axis) * n..][..n];
+            for (k, &other) in self.bubbles.iter().chain([&bubble]).enumerate() {
+                row[3 * k..3 * k + 3].copy_from_slice(&column[3 * other as usize..][..3]);
             }
         }
-        forward(above, self.stride, &mut x[..row]);
-        // Σ is positive definite; round-off may not leave that of a bubble that follows others.
-        let left = x[row] - dot(&x[..row], &x[..row]);
-        let least = f64::EPSILON * column[3 * bubble as usize + axis];
-        x[row] = left.max(least).sqrt();
+        let [x, y, z] = &mut rows;
+        forward(
+            above,
+            self.stride,
+            [&mut x[..first], &mut y[..first], &mut z[..first]],
+        );
+        // The last three columns, 3 x 3. Σ is positive definite; round-off may not leave that of a
+        // bubble that follows others.
+        for i in 0..3 {
+            for j in 0..=i {
+                let (of_i, of_j) = (&rows[i], &rows[j]);
+                let left = of_i[first + j] - dot(&of_i[..first + j], &of_j[..first + j]);
+                let entry = if i == j {
+                    let own = 3 * bubble as usize + i;
+                    left.max(f64::EPSILON * data.sigma[own * n + own]).sqrt()
+                } else {
+                    left / of_j[first + j]
+                };
+                rows[i][first + j] = entry;
+            }
+        }
     }
 
-    /// Makes the columns of a candidate.
+    /// Makes the columns of a candidate, and its blocks with those that have theirs.
     pub(super) fn ensure(&mut self, data: &BubbleData, candidate: u32) {
-        let i = candidate as usize;
-        if self.has_column[i] {
+        if self.pairs.slot(candidate).is_some() {
             return;
         }
-        self.has_column[i] = true;
         let rows = 3 * self.bubbles.len();
         let n_bubbles = data.positions.len();
-        for axis in 0..3 {
-            let z = &mut self.columns[(3 * i + axis) * self.stride..][..rows];
+        let slot = self.pairs.known().len();
+        let mut columns = self.columns[3 * slot * self.stride..].chunks_exact_mut(self.stride);
+        let (Some(x), Some(y), Some(z)) = (columns.next(), columns.next(), columns.next()) else {
+            return;
+        };
+        let mut columns = [&mut x[..rows], &mut y[..rows], &mut z[..rows]];
+        for (axis, z) in columns.iter_mut().enumerate() {
             for (z, &bubble) in z.chunks_exact_mut(3).zip(&self.bubbles) {
                 // Rᵀ e: row `axis` of R.
-                let block = &data.coupling[9 * (i * n_bubbles + bubble as usize)..][..9];
+                let block =
+                    &data.coupling[9 * (candidate as usize * n_bubbles + bubble as usize)..][..9];
                 for (c, z) in z.iter_mut().enumerate() {
                     *z = block[3 * c + axis];
                 }
             }
-            forward(&self.factor, self.stride, z);
         }
-    }
-
-    /// L⁻¹ R_Fᵀ v for a candidate whose columns are there.
-    pub(super) fn column_along(&self, candidate: u32, v: DVec3, out: &mut [f64]) {
-        debug_assert!(self.has_column[candidate as usize], "ensured before");
-        let [x, y, z] = [0, 1, 2].map(|axis| {
-            &self.columns[(3 * candidate as usize + axis) * self.stride..][..out.len()]
+        forward(&self.factor, self.stride, columns);
+        let (columns, stride) = (&self.columns, self.stride);
+        let column = |slot: usize, axis: usize| &columns[(3 * slot + axis) * stride..][..rows];
+        self.pairs.push(candidate, |k, _| {
+            DMat3::from_cols_array_2d(&std::array::from_fn(|c| {
+                std::array::from_fn(|r| dot(column(k, r), column(slot, c)))
+            }))
         });
-        for (k, out) in out.iter_mut().enumerate() {
-            *out = x[k] * v.x + y[k] * v.y + z[k] * v.z;
-        }
     }
 
     /// Bubble amplitudes Σ_FF⁻¹ R_Fᵀ f.
     pub(super) fn solve(&mut self, data: &BubbleData, active: &[ActiveContact]) {
         let rows = 3 * self.bubbles.len();
-        for contact in active {
-            self.ensure(data, contact.candidate);
-        }
+        let n_bubbles = data.positions.len();
         let amplitude = &mut self.amplitude[..rows];
         amplitude.fill(0.0);
         for contact in active {
-            for (axis, f) in contact.force_on_part.to_array().into_iter().enumerate() {
-                let column = 3 * contact.candidate as usize + axis;
-                let z = &self.columns[column * self.stride..][..rows];
-                for (sum, z) in amplitude.iter_mut().zip(z) {
-                    *sum += f * z;
+            let of_candidate = &data.coupling[9 * contact.candidate as usize * n_bubbles..];
+            for (k, &bubble) in self.bubbles.iter().enumerate() {
+                let block = DMat3::from_cols_slice(&of_candidate[9 * bubble as usize..][..9]);
+                let load = block.transpose() * contact.force_on_part;
+                for (sum, f) in amplitude[3 * k..3 * k + 3].iter_mut().zip(load.to_array()) {
+                    *sum += f;
                 }
             }
         }
+        forward(&self.factor, self.stride, [amplitude]);
         // Lᵀ x = y from the last row on.
         for k in (0..rows).rev() {
             let row = &self.factor[k * self.stride..][..=k];
@@ -190,11 +228,14 @@ impl FreeOperator {
     }
 }
 
-/// L x = b in place, L by rows.
-fn forward(factor: &[f64], stride: usize, x: &mut [f64]) {
-    for k in 0..x.len() {
+/// L x = b in place, L by rows, for some right-hand sides at once: L is read once.
+fn forward<const N: usize>(factor: &[f64], stride: usize, mut x: [&mut [f64]; N]) {
+    let n = x.first().map_or(0, |x| x.len());
+    for k in 0..n {
         let row = &factor[k * stride..][..=k];
-        x[k] = (x[k] - dot(&row[..k], &x[..k])) / row[k];
+        for x in &mut x {
+            x[k] = (x[k] - dot(&row[..k], &x[..k])) / row[k];
+        }
     }
 }
 
@@ -243,7 +284,7 @@ mod tests {
     }
 
     fn built(data: &BubbleData, from: &FreeOperator, target: &[u32], work: usize) -> FreeOperator {
-        let mut operator = FreeOperator::new(2, 3, 3);
+        let mut operator = FreeOperator::new(2, 2, 3, 3);
         operator.begin(from, target);
         while !operator.build(data, &[0, 1], work) {}
         operator
@@ -286,7 +327,7 @@ mod tests {
                 force_on_part,
             })
             .to_vec();
-        let empty = FreeOperator::new(2, 3, 3);
+        let empty = FreeOperator::new(2, 2, 3, 3);
         let first = built(&data, &empty, &[2, 0], 1);
         for (from, target) in [
             (&empty, &[0u32, 1, 2][..]),
@@ -298,6 +339,18 @@ mod tests {
             let mut operator = built(&data, from, target, 10_000);
             operator.solve(&data, &active);
             assert_eq!(operator.bubbles(), target);
+            // Rᵀ of both candidates by the blocks, which are made by the columns.
+            let share: DVec3 = active
+                .iter()
+                .map(|c| operator.block(0, c.candidate) * c.force_on_part)
+                .sum();
+            let by_amplitude: DVec3 = (0..target.len())
+                .map(|k| {
+                    let block = &data.coupling[9 * target[k] as usize..][..9];
+                    DMat3::from_cols_slice(block) * operator.amplitude(k)
+                })
+                .sum();
+            assert!((share - by_amplitude).length() < 1e-13, "{target:?}");
             let residual = residual(&data, &operator, &active);
             assert!(residual < 1e-13, "{target:?} {residual}");
         }

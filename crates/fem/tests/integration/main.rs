@@ -5,6 +5,7 @@
 mod common;
 mod patch;
 mod quality;
+mod raise;
 mod reader;
 mod reference;
 mod relations;

@@ -318,3 +318,84 @@ fn boundary_faces_are_closed_and_point_outward() {
         );
     }
 }
+
+/// Both nodes of one edge moved towards each other by s: on that edge det J is 1 + 13.5 s
+/// (1 - 6 t + 6 t²), lowest at its middle, 1 - 6.75 s, while at the nodes it is no less than
+/// 1 - 4.5 s. Zero at s = 4/27 = 0.1481.
+#[test]
+fn a_fold_of_a_cubic_element_that_samples_miss_is_found() {
+    let squeezed = |s: f64| {
+        let mut mesh = single(Order::Cubic);
+        mesh.nodes[4][0] += s;
+        mesh.nodes[5][0] -= s;
+        mesh
+    };
+    let folded = squeezed(0.152);
+    assert!(determinant(&folded, 0, [0.5, 0.5, 0.0, 0.0]) < -0.02);
+    let samples = Order::Cubic.node_coordinates().into_iter().chain(
+        fem::quadrature::tetrahedron(9)
+            .into_iter()
+            .map(|p| p.coordinates),
+    );
+    for l in samples {
+        assert!(determinant(&folded, 0, l) > 0.05, "{l:?} sees the fold");
+    }
+    assert!(folded.smallest_jacobian(0) < -0.02);
+    assert!(matches!(
+        check(&folded),
+        Err(Error::Inverted { tag: 7, .. })
+    ));
+    for s in [-0.05, 0.05, 0.1, 0.14] {
+        let bound = squeezed(s).smallest_jacobian(0);
+        assert!(bound > 0.0, "valid at {s}, bound {bound}");
+        assert!(check(&squeezed(s)).is_ok());
+    }
+    // By the formula of the edge: the proof holds to 1e-4 before the limit, and none after it.
+    let limit = 4.0 / 27.0;
+    assert!(squeezed(limit - 1e-4).smallest_jacobian(0) > 0.0);
+    assert!(squeezed(limit + 1e-4).smallest_jacobian(0) < 0.0);
+}
+
+/// Random bends of tet10 and tet20: the bound is below every value, and so close that an element
+/// with a good margin is never refused.
+#[test]
+fn the_bound_is_below_all_values_and_near_the_smallest() {
+    let mut state = 12345u64;
+    let mut random = move || {
+        state = state
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+    };
+    let (mut valid, mut folded) = (0, 0);
+    for order in [Order::Quadratic, Order::Cubic] {
+        for round in 0..200 {
+            let mut mesh = single(order);
+            let size = f64::from(round) / 200.0;
+            for x in &mut mesh.nodes {
+                *x = x.map(|c| c + size * random() / f64::from(order as u8));
+            }
+            let n = 16;
+            let mut lowest = f64::INFINITY;
+            for i in 0..=n {
+                for j in 0..=n - i {
+                    for k in 0..=n - i - j {
+                        let l = [i, j, k, n - i - j - k].map(|v| f64::from(v) / f64::from(n));
+                        lowest = lowest.min(determinant(&mesh, 0, l));
+                    }
+                }
+            }
+            let bound = mesh.smallest_jacobian(0);
+            assert!(bound <= lowest + 1e-8, "{order} {round}: {bound} {lowest}");
+            // 1 for the straight element.
+            if lowest > 0.005 {
+                valid += 1;
+                assert!(bound > 0.0, "{order} {round}: {bound} {lowest}");
+            }
+            if bound <= 0.0 && lowest < 0.0 {
+                folded += 1;
+            }
+        }
+    }
+    assert!(valid > 100 && folded > 50, "{valid} {folded}");
+}

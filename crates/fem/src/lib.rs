@@ -35,6 +35,7 @@ mod assembly;
 mod compliance;
 mod constrained;
 pub mod element;
+pub mod energy;
 mod error;
 mod factor;
 mod geometry;

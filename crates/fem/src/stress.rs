@@ -50,11 +50,18 @@ pub fn von_mises(s: &Tensor) -> f64 {
     (0.5 * normal + 3.0 * shear).sqrt()
 }
 
+/// Principal values of a symmetric tensor, the largest first.
+pub fn principal_values(t: &Tensor) -> [f64; 3] {
+    let m = nalgebra::Matrix3::from_fn(|i, j| t[i][j]);
+    let mut values: [f64; 3] = m.symmetric_eigenvalues().into();
+    values.sort_unstable_by(|a, b| b.total_cmp(a));
+    values
+}
+
 /// Largest principal value by size, with its sign dropped.
 pub fn largest_principal(t: &Tensor) -> f64 {
-    let m = nalgebra::Matrix3::from_fn(|i, j| t[i][j]);
-    m.symmetric_eigenvalues()
-        .iter()
+    principal_values(t)
+        .into_iter()
         .fold(0.0f64, |a, v| a.max(v.abs()))
 }
 
@@ -124,6 +131,15 @@ fn local_coordinates(mesh: &Mesh, element: usize, point: [f64; 3]) -> Option<[f6
     (change < 1e-9).then_some(l)
 }
 
+/// Strain at a point of the body; its principal values are [`principal_values`] of it.
+///
+/// # Errors
+/// [`Error::OutsideMesh`].
+pub fn strain_at_point(mesh: &Mesh, u: &[f64], point: [f64; 3]) -> Result<Tensor, Error> {
+    let (e, l) = locate(mesh, point).ok_or(Error::OutsideMesh(point))?;
+    Ok(strain(&displacement_gradient(mesh, u, e, l)))
+}
+
 /// Stress at a point of the body, Pa.
 ///
 /// # Errors
@@ -143,6 +159,16 @@ pub fn stress_at_point(
     ))
 }
 
+/// Strain at the nodes of an element, in the element's node order: its own, not averaged with
+/// that of its neighbours.
+pub fn element_nodal_strain(mesh: &Mesh, u: &[f64], element: usize) -> Vec<Tensor> {
+    mesh.order
+        .node_coordinates()
+        .into_iter()
+        .map(|l| strain(&displacement_gradient(mesh, u, element, l)))
+        .collect()
+}
+
 /// Stress at the nodes of an element, Pa, in the element's node order: its own, not averaged with
 /// that of its neighbours.
 pub fn element_nodal_stress(
@@ -153,16 +179,21 @@ pub fn element_nodal_stress(
     element: usize,
 ) -> Vec<Tensor> {
     let material = &materials[material_of_element[element] as usize];
-    mesh.order
-        .node_coordinates()
-        .into_iter()
-        .map(|l| {
-            stress(
-                material,
-                &strain(&displacement_gradient(mesh, u, element, l)),
-            )
-        })
+    element_nodal_strain(mesh, u, element)
+        .iter()
+        .map(|eps| stress(material, eps))
         .collect()
+}
+
+/// Strain at every node: that of each element at the node, averaged over its elements; zero at
+/// nodes of no element.
+pub fn nodal_strain(mesh: &Mesh, u: &[f64]) -> Vec<Tensor> {
+    average_at_nodes(mesh, |e| element_nodal_strain(mesh, u, e))
+}
+
+/// Principal values of [`nodal_strain`] at every node, the largest first.
+pub fn nodal_principal_strains(mesh: &Mesh, u: &[f64]) -> Vec<[f64; 3]> {
+    nodal_strain(mesh, u).iter().map(principal_values).collect()
 }
 
 /// Stress at every node, Pa: that of each element at the node, averaged over its elements. Where
@@ -173,23 +204,9 @@ pub fn nodal_stress(
     material_of_element: &[u32],
     u: &[f64],
 ) -> Vec<Tensor> {
-    let mut sum = vec![[[0.0; 3]; 3]; mesh.n_nodes()];
-    let mut count = vec![0.0f64; mesh.n_nodes()];
-    for e in 0..mesh.n_elements() {
-        let stresses = element_nodal_stress(mesh, materials, material_of_element, u, e);
-        for (&node, s) in mesh.element_nodes(e).iter().zip(stresses) {
-            count[node as usize] += 1.0;
-            for i in 0..3 {
-                for j in 0..3 {
-                    sum[node as usize][i][j] += s[i][j];
-                }
-            }
-        }
-    }
-    sum.into_iter()
-        .zip(count)
-        .map(|(s, n)| s.map(|row| row.map(|x| x / n.max(1.0))))
-        .collect()
+    average_at_nodes(mesh, |e| {
+        element_nodal_stress(mesh, materials, material_of_element, u, e)
+    })
 }
 
 /// Von Mises stress at every node, Pa, of [`nodal_stress`].
@@ -202,6 +219,26 @@ pub fn nodal_von_mises(
     nodal_stress(mesh, materials, material_of_element, u)
         .iter()
         .map(von_mises)
+        .collect()
+}
+
+/// Mean at every node of what its elements have there, given for each element in its node order.
+fn average_at_nodes(mesh: &Mesh, of_element: impl Fn(usize) -> Vec<Tensor>) -> Vec<Tensor> {
+    let mut sum = vec![[[0.0; 3]; 3]; mesh.n_nodes()];
+    let mut count = vec![0.0f64; mesh.n_nodes()];
+    for e in 0..mesh.n_elements() {
+        for (&node, t) in mesh.element_nodes(e).iter().zip(of_element(e)) {
+            count[node as usize] += 1.0;
+            for i in 0..3 {
+                for j in 0..3 {
+                    sum[node as usize][i][j] += t[i][j];
+                }
+            }
+        }
+    }
+    sum.into_iter()
+        .zip(count)
+        .map(|(t, n)| t.map(|row| row.map(|x| x / n.max(1.0))))
         .collect()
 }
 

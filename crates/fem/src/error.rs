@@ -69,6 +69,17 @@ pub enum Error {
         /// "; N more are too", or nothing.
         more: String,
     },
+    /// Neighbours that do not share the nodes of their common edge or face.
+    #[error(
+        "element {tag} does not fit its neighbours: node {node} has another place in one of them, \
+         or they have another node at its place; make the mesh anew, with coincident nodes merged"
+    )]
+    NotConforming {
+        /// Tag of the element in the file.
+        tag: u64,
+        /// Tag of the node in the file.
+        node: u64,
+    },
     /// A face of a group that is on no element, so that a new order or size of elements gives it
     /// no nodes.
     #[error(

@@ -30,21 +30,26 @@ pub(super) struct Lattice<'a> {
 impl<'a> Lattice<'a> {
     /// Begins with the old nodes that are places of the lattice, in their old sequence and with
     /// their tags; those that are of no element are left out.
-    pub(super) fn new(old: &'a Mesh, steps: u8) -> Self {
-        let old_steps = old.order as u8;
-        let places: Vec<Option<[u8; 4]>> = weights(old.order)
-            .into_iter()
-            .map(|w| {
-                let is_place = w.iter().all(|x| x * steps % old_steps == 0);
-                is_place.then(|| w.map(|x| x * steps / old_steps))
-            })
-            .collect();
-        let mut key_of_old: Vec<Option<Key>> = vec![None; old.n_nodes()];
+    ///
+    /// # Errors
+    /// [`Error::NotConforming`] if neighbours do not share the nodes of their common edge or face,
+    /// which would be glued or torn by giving each place one node.
+    pub(super) fn new(old: &'a Mesh, steps: u8) -> Result<Self, Error> {
+        let places = weights(old.order);
+        let mut key_of_node: Vec<Option<Key>> = vec![None; old.n_nodes()];
+        let mut node_of_key = HashMap::with_capacity(old.n_nodes());
         for e in 0..old.n_elements() {
             let nodes = old.element_nodes(e);
             for (&node, place) in nodes.iter().zip(&places) {
-                if let Some(place) = place {
-                    key_of_old[node as usize] = Some(key(&nodes[..4], place));
+                let key = key(&nodes[..4], place);
+                let place_before = key_of_node[node as usize].replace(key);
+                let node_before = node_of_key.insert(key, node);
+                if place_before.is_some_and(|k| k != key) || node_before.is_some_and(|n| n != node)
+                {
+                    return Err(Error::NotConforming {
+                        tag: old.element_tags[e],
+                        node: old.node_tags[node as usize],
+                    });
                 }
             }
         }
@@ -57,16 +62,17 @@ impl<'a> Lattice<'a> {
             kept: vec![None; old.n_nodes()],
             next_tag: old.node_tags.iter().max().map_or(1, |t| t + 1),
         };
-        for (node, key) in key_of_old.into_iter().enumerate() {
-            if let Some(key) = key {
-                let index = lattice.nodes.len() as u32;
-                lattice.known.insert(key, index);
-                lattice.kept[node] = Some(index);
-                lattice.nodes.push(old.nodes[node]);
-                lattice.node_tags.push(old.node_tags[node]);
-            }
+        for (node, key) in key_of_node.into_iter().enumerate() {
+            let Some(key) = key.and_then(|k| rescaled(k, old.order as u8, steps)) else {
+                continue;
+            };
+            let index = lattice.nodes.len() as u32;
+            lattice.known.insert(key, index);
+            lattice.kept[node] = Some(index);
+            lattice.nodes.push(old.nodes[node]);
+            lattice.node_tags.push(old.node_tags[node]);
         }
-        lattice
+        Ok(lattice)
     }
 
     /// The node at a place of an old element, made on the element's map if it is new.
@@ -211,4 +217,15 @@ fn key(vertices: &[u32], place: &[u8]) -> Key {
     }
     key[..n].sort_unstable();
     key
+}
+
+/// The same place in other steps, if it is on that lattice.
+fn rescaled(mut key: Key, from: u8, to: u8) -> Option<Key> {
+    for (_, weight) in &mut key {
+        if !(*weight * to).is_multiple_of(from) {
+            return None;
+        }
+        *weight = *weight * to / from;
+    }
+    Some(key)
 }

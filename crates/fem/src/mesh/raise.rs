@@ -21,12 +21,13 @@ impl Mesh {
     ///
     /// # Errors
     /// [`Error::OrderInvalid`] if an element turns inside out or flat at that order,
-    /// [`Error::Inverted`] if it already is, [`Error::FaceOfNoElement`].
+    /// [`Error::Inverted`] if it already is, [`Error::NotConforming`],
+    /// [`Error::FaceOfNoElement`].
     pub fn with_order(&self, order: Order) -> Result<Self, Error> {
         if order == self.order {
             return Ok(self.clone());
         }
-        let mut lattice = Lattice::new(self, order as u8);
+        let mut lattice = Lattice::new(self, order as u8)?;
         let places = weights(order);
         let mut elements = Vec::with_capacity(self.n_elements() * places.len());
         for e in 0..self.n_elements() {

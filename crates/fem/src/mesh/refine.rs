@@ -39,10 +39,11 @@ impl Mesh {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Inverted`] if an element is not valid, [`Error::FaceOfNoElement`].
+    /// [`Error::Inverted`] if an element is not valid, [`Error::NotConforming`],
+    /// [`Error::FaceOfNoElement`].
     pub fn refined(&self) -> Result<Self, Error> {
         self.check_elements()?;
-        let mut lattice = Lattice::new(self, 2 * self.order as u8);
+        let mut lattice = Lattice::new(self, 2 * self.order as u8)?;
         let node_weights = weights(self.order);
         let by_diagonal: Vec<Vec<[u8; 4]>> = DIAGONALS
             .iter()

@@ -1,6 +1,6 @@
 //! Meshes made by formula, and the shortest way to a solution.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
 use fem::{Group, Material, Mesh, Order, Quadrature, Stiffness, Supports};
@@ -160,4 +160,94 @@ pub(crate) fn place(mesh: &Mesh, element: usize, l: [f64; 4]) -> [f64; 3] {
             .map(|(&node, n)| n * mesh.nodes[node as usize][c])
             .sum()
     })
+}
+
+/// Area of the faces of a group, m². Tangents by central differences of the tetrahedron's shape
+/// functions on its face 0: another way than the crate's, good to 1e-10.
+pub(crate) fn area(mesh: &Mesh, name: &str) -> f64 {
+    let shape = |order: Order, l: [f64; 3]| -> Vec<[f64; 2]> {
+        let h = 1e-5;
+        let local = order.face_nodes(0);
+        let at = |l: [f64; 3]| {
+            let mut full = [0.0; 4];
+            for (v, x) in fem::element::FACE_VERTICES[0].into_iter().zip(l) {
+                full[v] = x;
+            }
+            let (mut n, mut d) = ([0.0; 20], [[0.0; 4]; 20]);
+            order.shape(full, &mut n, &mut d);
+            local.iter().map(|&i| n[i]).collect::<Vec<f64>>()
+        };
+        let along = |k: usize| {
+            let (mut up, mut down) = (l, l);
+            (up[k], up[0], down[k], down[0]) = (l[k] + h, l[0] - h, l[k] - h, l[0] + h);
+            let (up, down) = (at(up), at(down));
+            up.into_iter()
+                .zip(down)
+                .map(|(a, b)| (a - b) / (2.0 * h))
+                .collect::<Vec<f64>>()
+        };
+        along(1)
+            .into_iter()
+            .zip(along(2))
+            .map(|(a, b)| [a, b])
+            .collect()
+    };
+    let rule = fem::quadrature::triangle(24);
+    let shapes: Vec<(f64, Vec<[f64; 2]>)> = rule
+        .iter()
+        .map(|p| (p.weight, shape(mesh.order, p.coordinates)))
+        .collect();
+    let mut sum = 0.0;
+    for face in &mesh.group(name).unwrap().faces {
+        for (weight, d) in &shapes {
+            let tangent = |k: usize| -> [f64; 3] {
+                std::array::from_fn(|c| {
+                    face.nodes
+                        .iter()
+                        .zip(d)
+                        .map(|(&n, d)| d[k] * mesh.nodes[n as usize][c])
+                        .sum()
+                })
+            };
+            let (a, b) = (tangent(0), tangent(1));
+            let normal: [f64; 3] = std::array::from_fn(|i| {
+                a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3]
+            });
+            sum += 0.5 * weight * normal.iter().map(|x| x * x).sum::<f64>().sqrt();
+        }
+    }
+    sum
+}
+
+/// Coordinates to 1e-9, as a set.
+pub(crate) fn coordinates(mesh: &Mesh, nodes: impl IntoIterator<Item = u32>) -> BTreeSet<[i64; 3]> {
+    nodes
+        .into_iter()
+        .map(|n| mesh.nodes[n as usize].map(|c| (c * 1e9).round() as i64))
+        .collect()
+}
+
+pub(crate) fn all_coordinates(mesh: &Mesh) -> BTreeSet<[i64; 3]> {
+    coordinates(mesh, 0..mesh.n_nodes() as u32)
+}
+
+/// Each node is on one place only, and every node belongs to an element.
+pub(crate) fn assert_no_node_twice(mesh: &Mesh) {
+    assert_eq!(all_coordinates(mesh).len(), mesh.n_nodes());
+    let used: BTreeSet<u32> = mesh.elements.iter().copied().collect();
+    assert_eq!(used.len(), mesh.n_nodes());
+    let tags: BTreeSet<u64> = mesh.node_tags.iter().copied().collect();
+    assert_eq!(tags.len(), mesh.n_nodes());
+}
+
+/// Turns an element inside out: its vertices 1 and 2 swapped, with all their mid nodes.
+pub(crate) fn mirror(mesh: &mut Mesh, element: usize) {
+    let places = mesh.order.node_coordinates();
+    let nodes = mesh.element_nodes(element).to_vec();
+    let first = element * nodes.len();
+    for (i, l) in places.iter().enumerate() {
+        let other = [l[0], l[2], l[1], l[3]];
+        let at = places.iter().position(|m| *m == other).unwrap();
+        mesh.elements[first + i] = nodes[at];
+    }
 }

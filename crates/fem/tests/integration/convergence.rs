@@ -150,7 +150,7 @@ fn errors(order: Order, n: usize) -> [f64; 2] {
     let load = fem::load::pressure(&mesh, mesh.group("inner").unwrap(), PRESSURE).unwrap();
     let u = factor.solve(&load);
     let rest = vec![0.0; u.len()];
-    // The error is a smooth function times a polynomial: 9 changes it by less than the orders show.
+    // Degree 15 changes these norms by 1e-5 of them at most.
     let energy = |u: &[f64]| energy_error(&mesh, &[material], &of_element, u, strain, 9);
     let l2 = |u: &[f64]| l2_error(&mesh, u, displacement, 9);
     [energy(&u) / energy(&rest), l2(&u) / l2(&rest)]

@@ -2,7 +2,7 @@
 
 use fem::{Error, Mesh, Order, Supports};
 
-use crate::common::{ORDERS, bend, cube, hold, place, read};
+use crate::common::{ORDERS, bend, cube, hold, mirror, place, read};
 
 /// One element on the unit tetrahedron, tag 7.
 fn single(order: Order) -> Mesh {
@@ -59,19 +59,7 @@ fn inverted_elements_are_named_by_their_tag() {
     for order in ORDERS {
         let mut mesh = cube(order, 2, |x| x);
         mesh.element_tags[11] = 4711;
-        let n = order.nodes_per_element();
-        // Mirror the numbering of one element: 1 and 2 swapped turns it inside out.
-        let nodes = mesh.element_nodes(11).to_vec();
-        let mirrored: Vec<u32> = order
-            .node_coordinates()
-            .iter()
-            .map(|l| {
-                let other = [l[0], l[2], l[1], l[3]];
-                let at = order.node_coordinates().iter().position(|m| *m == other);
-                nodes[at.unwrap()]
-            })
-            .collect();
-        mesh.elements[11 * n..12 * n].copy_from_slice(&mirrored);
+        mirror(&mut mesh, 11);
         let error = check(&mesh).unwrap_err();
         assert!(
             matches!(error, Error::Inverted { tag: 4711, .. }),

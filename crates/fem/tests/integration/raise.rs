@@ -1,96 +1,15 @@
-//! The same body at another order and with smaller elements: shape, groups, fields, refusals.
+//! The same body at another order and with smaller elements: shape, groups, fields.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
-use fem::{Error, FactoredStiffness, Group, Mesh, Order, Quadrature, Silent};
+use fem::{FactoredStiffness, Group, Mesh, Order, Quadrature, Silent};
 
 use crate::common::{
-    ORDERS, assemble, bend, cube, hold, interpolate, largest, largest_difference, place, read,
-    steel,
+    ORDERS, all_coordinates, area, assemble, assert_no_node_twice, bend, coordinates, cube, hold,
+    interpolate, largest, largest_difference, read, steel,
 };
 
-fn area(mesh: &Mesh, name: &str) -> f64 {
-    // The integral of |dA| is the largest total that a traction spreads: by the faces of a plane
-    // or curved group with a polynomial area element, exactly; else to the rule's 1e-9.
-    let shape = |order: Order, l: [f64; 3]| -> Vec<[f64; 2]> {
-        // Derivatives of the triangle's functions by central differences of the tetrahedron's,
-        // whose face 0 is the triangle: an independent way to the tangents.
-        let h = 1e-5;
-        let local = order.face_nodes(0);
-        let at = |l: [f64; 3]| {
-            let mut full = [0.0; 4];
-            for (v, x) in fem::element::FACE_VERTICES[0].into_iter().zip(l) {
-                full[v] = x;
-            }
-            let (mut n, mut d) = ([0.0; 20], [[0.0; 4]; 20]);
-            order.shape(full, &mut n, &mut d);
-            local.iter().map(|&i| n[i]).collect::<Vec<f64>>()
-        };
-        let along = |k: usize| {
-            let (mut up, mut down) = (l, l);
-            (up[k], up[0], down[k], down[0]) = (l[k] + h, l[0] - h, l[k] - h, l[0] + h);
-            let (up, down) = (at(up), at(down));
-            up.into_iter()
-                .zip(down)
-                .map(|(a, b)| (a - b) / (2.0 * h))
-                .collect::<Vec<f64>>()
-        };
-        along(1)
-            .into_iter()
-            .zip(along(2))
-            .map(|(a, b)| [a, b])
-            .collect()
-    };
-    let rule = fem::quadrature::triangle(24);
-    let shapes: Vec<(f64, Vec<[f64; 2]>)> = rule
-        .iter()
-        .map(|p| (p.weight, shape(mesh.order, p.coordinates)))
-        .collect();
-    let mut sum = 0.0;
-    for face in &mesh.group(name).unwrap().faces {
-        for (weight, d) in &shapes {
-            let tangent = |k: usize| -> [f64; 3] {
-                std::array::from_fn(|c| {
-                    face.nodes
-                        .iter()
-                        .zip(d)
-                        .map(|(&n, d)| d[k] * mesh.nodes[n as usize][c])
-                        .sum()
-                })
-            };
-            let (a, b) = (tangent(0), tangent(1));
-            let normal: [f64; 3] = std::array::from_fn(|i| {
-                a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3]
-            });
-            sum += 0.5 * weight * normal.iter().map(|x| x * x).sum::<f64>().sqrt();
-        }
-    }
-    sum
-}
-
-/// Coordinates to 1e-9, as a set.
-fn coordinates(mesh: &Mesh, nodes: impl IntoIterator<Item = u32>) -> BTreeSet<[i64; 3]> {
-    nodes
-        .into_iter()
-        .map(|n| mesh.nodes[n as usize].map(|c| (c * 1e9).round() as i64))
-        .collect()
-}
-
-fn all_coordinates(mesh: &Mesh) -> BTreeSet<[i64; 3]> {
-    coordinates(mesh, 0..mesh.n_nodes() as u32)
-}
-
-/// Each node is on one place only, and every node belongs to an element.
-fn assert_no_node_twice(mesh: &Mesh) {
-    assert_eq!(all_coordinates(mesh).len(), mesh.n_nodes());
-    let used: BTreeSet<u32> = mesh.elements.iter().copied().collect();
-    assert_eq!(used.len(), mesh.n_nodes());
-    let tags: BTreeSet<u64> = mesh.node_tags.iter().copied().collect();
-    assert_eq!(tags.len(), mesh.n_nodes());
-}
-
-/// The mesh as Gmsh would number it if it had no mid nodes: what a way to a higher order and back
-/// must give again.
+/// Numbers, tags and groups alike, coordinates to round-off.
 fn assert_same(a: &Mesh, b: &Mesh) {
     assert_eq!(a.elements, b.elements);
     assert_eq!(a.element_tags, b.element_tags);
@@ -267,40 +186,6 @@ fn raising_and_refining_keep_the_shape() {
     }
 }
 
-/// The number of nodes of the refined cube is that of the cube with twice as many cells, and each
-/// edge is where it should be: Euler's formula leaves no room for a node too many.
-#[test]
-fn refining_makes_each_shared_node_once() {
-    for order in ORDERS {
-        let finer = cube(order, 1, bend).refined().unwrap();
-        let p = order as usize;
-        assert_eq!(finer.n_nodes(), (2 * p + 1).pow(3));
-        let twice = finer.refined().unwrap();
-        assert_eq!(twice.n_nodes(), (4 * p + 1).pow(3));
-        assert_eq!(
-            twice.check(&hold(&twice, &twice.surface_nodes())),
-            Ok(vec![])
-        );
-        // Closed: the boundary is the refined group, each face once.
-        let key = |nodes: &[u32]| nodes[..3].iter().copied().collect::<BTreeSet<u32>>();
-        let boundary: BTreeSet<_> = twice
-            .boundary_faces()
-            .iter()
-            .map(|f| key(&f.nodes))
-            .collect();
-        let group = twice.group("surface").unwrap();
-        assert_eq!(group.faces.len(), 12 * 16);
-        assert_eq!(
-            group
-                .faces
-                .iter()
-                .map(|f| key(&f.nodes))
-                .collect::<BTreeSet<_>>(),
-            boundary
-        );
-    }
-}
-
 /// The group's faces keep their sense of turning and their places: pressure on them is the same.
 #[test]
 fn a_load_on_a_group_is_the_same_on_the_raised_and_refined_mesh() {
@@ -472,20 +357,6 @@ fn fields_of_the_space_stay_what_they_are() {
     }
 }
 
-/// Points of a parent are points of one of its children, at any place of curved elements.
-#[test]
-fn children_cover_their_parent_and_nothing_else() {
-    for mesh in [read("ring-tet10.msh"), read("ring-tet20.msh")] {
-        let finer = mesh.refined().unwrap();
-        for e in [0, mesh.n_elements() / 2, mesh.n_elements() - 1] {
-            for l in [[0.25; 4], [0.6, 0.2, 0.1, 0.1], [0.3, 0.35, 0.15, 0.2]] {
-                let (found, _) = fem::stress::locate(&finer, place(&mesh, e, l)).unwrap();
-                assert_eq!(found / 8, e);
-            }
-        }
-    }
-}
-
 /// The patch test on a refined curved mesh, and the solution of a straight one held by both
 /// meshes: a quadratic field given on the boundary comes out inside.
 #[test]
@@ -511,185 +382,10 @@ fn the_patch_test_holds_on_raised_and_refined_meshes() {
     assert!(error(&curved.unwrap(), &linear) < 1e-13);
 }
 
-/// A valid tet10 whose vertices alone span an inverted tetrahedron: a thin strip along the curve
-/// c(t) = (t², t - 1.05 t²), which climbs, turns over and ends below its start. Across it lies
-/// 0.1 r normal to c'(t), so det J = 0.1 (|c'|² - 0.2 r), with |c'|² at least 0.47.
-///
-/// ```text
-///   z    .-- --.
-///   |   /       \
-///   |  |         |
-///   +--|---------3-- x      vertex 3 at z = -0.05, below the base 012
-/// ```
-fn bent_over() -> Mesh {
-    let nodes: Vec<[f64; 3]> = Order::Quadratic
-        .node_coordinates()
-        .iter()
-        .map(|l| {
-            let (r, y, t) = (0.1 * l[1], l[2], l[3]);
-            [
-                t * t + r * (1.0 - 2.1 * t),
-                y,
-                t - 1.05 * t * t - 2.0 * r * t,
-            ]
-        })
-        .collect();
-    Mesh::new(
-        Order::Quadratic,
-        nodes,
-        (1..=10).collect(),
-        (0..10).collect(),
-        vec![12],
-        vec![],
-    )
-}
-
-#[test]
-fn an_element_that_turns_over_at_the_order_is_named_with_the_mend() {
-    let mesh = bent_over();
-    assert!(mesh.smallest_jacobian(0) > 0.0);
-    assert!(mesh.with_order(Order::Cubic).is_ok());
-    assert!(mesh.refined().is_ok());
-    let error = mesh.with_order(Order::Linear).unwrap_err();
-    let Error::OrderInvalid {
-        tag,
-        order,
-        from,
-        jacobian,
-        ..
-    } = error
-    else {
-        panic!("{error}");
-    };
-    assert_eq!((tag, order, from), (12, 1, 2));
-    // Base 0.1 times 1, height -0.05.
-    assert!((jacobian + 0.005).abs() < 1e-15, "{jacobian}");
-    assert_eq!(
-        error.to_string(),
-        "element 12 becomes inverted or flat at order 1 (smallest Jacobian -5.000e-3 m³); \
-         ask for order = 2, or make the mesh anew with `gmsh -order 1 -optimize_ho`, \
-         finer where it curves"
-    );
-}
-
-#[test]
-fn an_element_that_was_inverted_is_not_blamed_on_the_order() {
-    for order in ORDERS {
-        let mut mesh = cube(order, 1, |x| x);
-        mesh.element_tags[4] = 99;
-        mesh.elements.swap(
-            4 * order.nodes_per_element(),
-            4 * order.nodes_per_element() + 1,
-        );
-        for to in ORDERS.into_iter().filter(|o| *o != order) {
-            let error = mesh.with_order(to).unwrap_err();
-            assert!(matches!(error, Error::Inverted { tag: 99, .. }), "{error}");
-        }
-        let error = mesh.refined().unwrap_err();
-        assert!(matches!(error, Error::Inverted { tag: 99, .. }), "{error}");
-    }
-}
-
-#[test]
-fn a_face_of_no_element_is_named() {
-    let mut mesh = cube(Order::Linear, 2, |x| x);
-    // Three corners of the cube, which no element joins.
-    let corner = |x: [f64; 3]| mesh.nodes.iter().position(|n| *n == x).unwrap() as u32;
-    let nodes = vec![
-        corner([0.0; 3]),
-        corner([1.0, 0.0, 0.0]),
-        corner([0.0, 1.0, 0.0]),
-    ];
-    let tags = [0, 1, 2].map(|k| mesh.node_tags[nodes[k] as usize]);
-    mesh.groups[1].faces.push(fem::Face { nodes });
-    let expected = Error::FaceOfNoElement {
-        group: "load".to_owned(),
-        tags,
-    };
-    assert_eq!(mesh.with_order(Order::Quadratic), Err(expected.clone()));
-    assert_eq!(mesh.refined(), Err(expected.clone()));
-    assert!(
-        expected
-            .to_string()
-            .starts_with("group \"load\": the face with the corner nodes")
-    );
-}
-
-#[test]
-fn nodes_of_no_element_are_left_out() {
-    let whole = cube(Order::Quadratic, 1, |x| x);
-    let mut nodes = whole.nodes.clone();
-    nodes.push([9.0; 3]);
-    let mut tags = whole.node_tags.clone();
-    tags.push(700);
-    let mesh = Mesh::new(
-        whole.order,
-        nodes,
-        tags,
-        whole.elements.clone(),
-        whole.element_tags.clone(),
-        vec![Group {
-            name: "loose".to_owned(),
-            dimension: 2,
-            nodes: vec![whole.n_nodes() as u32],
-            faces: vec![],
-            elements: vec![],
-        }],
-    );
-    for other in [mesh.with_order(Order::Linear), mesh.refined()] {
-        let other = other.unwrap();
-        assert_no_node_twice(&other);
-        assert_eq!(other.node_of_tag(700), None);
-        assert!(other.groups[0].nodes.is_empty());
-    }
-}
-
 /// The same bits again: nothing hangs on the sequence of a hash map.
 #[test]
 fn raising_and_refining_are_repeatable() {
     let mesh = read("ring-tet10.msh");
     assert_eq!(mesh.with_order(Order::Cubic), mesh.with_order(Order::Cubic));
     assert_eq!(mesh.refined(), mesh.refined());
-}
-
-/// The four inner children share the shortest diagonal, and a shift of the mesh (other round-off,
-/// many ties) cuts alike.
-#[test]
-fn the_octahedron_is_cut_along_its_shortest_diagonal() {
-    let map = |x: [f64; 3]| [x[0] + 0.4 * x[1], x[1] + 0.3 * x[2], 2.0 * x[2]];
-    let mesh = cube(Order::Linear, 2, map);
-    let finer = mesh.refined().unwrap();
-    let square = |a: [f64; 3], b: [f64; 3]| -> f64 { (0..3).map(|c| (a[c] - b[c]).powi(2)).sum() };
-    let mut chosen = BTreeMap::new();
-    for e in 0..mesh.n_elements() {
-        let middle = |a: usize, b: usize| {
-            let mut l = [0.0; 4];
-            (l[a], l[b]) = (0.5, 0.5);
-            place(&mesh, e, l)
-        };
-        let squares = [
-            square(middle(0, 1), middle(2, 3)),
-            square(middle(0, 2), middle(1, 3)),
-            square(middle(0, 3), middle(1, 2)),
-        ];
-        let shortest = squares.into_iter().fold(f64::INFINITY, f64::min);
-        let at = squares.iter().position(|s| *s == shortest).unwrap();
-        *chosen.entry(at).or_insert(0) += 1;
-        let inner: Vec<&[u32]> = (8 * e + 4..8 * e + 8)
-            .map(|c| finer.element_nodes(c))
-            .collect();
-        let shared: Vec<u32> = (inner[0].iter().copied())
-            .filter(|n| inner.iter().all(|child| child.contains(n)))
-            .collect();
-        assert_eq!(shared.len(), 2);
-        let [a, b] = [0, 1].map(|k| finer.nodes[shared[k] as usize]);
-        assert!((square(a, b) / shortest - 1.0).abs() < 1e-8);
-    }
-    assert!(
-        chosen.len() > 1,
-        "one diagonal is always the shortest: {chosen:?}"
-    );
-    let regular = cube(Order::Linear, 2, |x| x).refined().unwrap();
-    let shifted = cube(Order::Linear, 2, |x| x.map(|c| c + 0.7));
-    assert_eq!(regular.elements, shifted.refined().unwrap().elements);
 }

@@ -13,9 +13,9 @@ impl Mesh {
     /// cuts off the rest of the curvature.
     ///
     /// The vertices stay, in their sequence and with their tags; they come first. The other nodes
-    /// follow in the sequence of the elements, with tags from the largest tag + 1. So a node is in
-    /// both meshes exactly if [`Mesh::node_of_tag`] finds its tag in both up to the largest tag of
-    /// this one. Nodes of no element are left out. Elements keep their sequence and tags, groups
+    /// follow in the sequence of the elements, with tags from the largest tag + 1. So a tag that both
+    /// meshes have is the same node in both ([`Mesh::node_of_tag`]), and no other node is shared.
+    /// Nodes of no element are left out. Elements keep their sequence and tags, groups
     /// their names, faces (same sense of turning) and elements; a group that is only a list of
     /// nodes keeps those that are still there. The present order gives a copy.
     ///

@@ -15,7 +15,7 @@ pub(super) const DIAGONALS: [[[u8; 4]; 2]; 3] = [
 ];
 
 /// Two diagonals count as equally long below this relative difference of their squares, and the
-/// first is taken: round-off (1e-15) must not decide, so that a shifted mesh is cut alike.
+/// first is taken: round-off (1e-15) must not decide, so that a moved mesh is cut alike.
 const TIE: f64 = 1e-9;
 
 impl Mesh {

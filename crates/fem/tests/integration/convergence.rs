@@ -162,14 +162,14 @@ fn check_orders(order: Order, meshes: &[usize]) {
     let errors: Vec<[f64; 2]> = meshes.iter().map(|&n| errors(order, n)).collect();
     let theory = [f64::from(order as u8), f64::from(order as u8) + 1.0];
     let mut last = [0.0; 2];
-    println!(
+    eprintln!(
         "order {order}: n {}, energy and L2 {:?}",
         meshes[0], errors[0]
     );
     for k in 1..meshes.len() {
         let ratio = (meshes[k] as f64 / meshes[k - 1] as f64).ln();
         last = [0, 1].map(|c| (errors[k - 1][c] / errors[k][c]).ln() / ratio);
-        println!(
+        eprintln!(
             "order {order}: n {}, energy and L2 {:?}, orders {last:.3?}",
             meshes[k], errors[k]
         );

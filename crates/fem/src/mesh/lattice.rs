@@ -60,7 +60,7 @@ impl<'a> Lattice<'a> {
             nodes: Vec::new(),
             node_tags: Vec::new(),
             kept: vec![None; old.n_nodes()],
-            next_tag: old.node_tags.iter().max().map_or(1, |t| t + 1),
+            next_tag: old.node_tags.iter().max().map_or(1, |t| t.wrapping_add(1)),
         };
         for (node, key) in key_of_node.into_iter().enumerate() {
             let Some(key) = key.and_then(|k| rescaled(k, old.order as u8, steps)) else {
@@ -84,8 +84,12 @@ impl<'a> Lattice<'a> {
         let index = self.nodes.len() as u32;
         let l = place.map(|w| f64::from(w) / f64::from(self.steps));
         self.nodes.push(self.old.point(element, l));
+        // A file may use the largest number there is; then go on with the free ones from 0.
+        while self.old.node_of_tag(self.next_tag).is_some() {
+            self.next_tag = self.next_tag.wrapping_add(1);
+        }
         self.node_tags.push(self.next_tag);
-        self.next_tag += 1;
+        self.next_tag = self.next_tag.wrapping_add(1);
         self.known.insert(key, index);
         index
     }

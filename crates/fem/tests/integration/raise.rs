@@ -144,6 +144,23 @@ fn vertices_keep_their_sequence_and_tags() {
     assert_eq!(finer.node_tags[mesh.n_nodes()], 1001);
 }
 
+#[test]
+fn new_tags_are_free_even_after_the_largest_number() {
+    let mesh = cube(Order::Linear, 1, |x| x);
+    let mut tags = mesh.node_tags.clone();
+    tags[3] = u64::MAX;
+    let mesh = Mesh::new(
+        mesh.order,
+        mesh.nodes,
+        tags,
+        mesh.elements,
+        mesh.element_tags,
+        vec![],
+    );
+    assert_no_node_twice(&mesh.with_order(Order::Cubic).unwrap());
+    assert_no_node_twice(&mesh.refined().unwrap());
+}
+
 /// Curved meshes: volume and area to round-off (the areas' tangents are central differences).
 #[test]
 fn raising_and_refining_keep_the_shape() {

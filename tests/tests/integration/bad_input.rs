@@ -260,3 +260,67 @@ fn a_part_that_is_not_held_is_refused_with_the_free_motion() {
         outcome.err
     );
 }
+
+/// One quadratic element that is valid, bent over so far that its vertices alone are inside out.
+fn bent_over_mesh() -> String {
+    // Barycentric coordinates of Gmsh's ten nodes.
+    let edges = [[0, 1], [1, 2], [0, 2], [0, 3], [2, 3], [1, 3]];
+    let mut nodes: Vec<[f64; 4]> = (0..4)
+        .map(|v| std::array::from_fn(|k| f64::from(u8::from(k == v))))
+        .collect();
+    nodes.extend(edges.map(|[a, b]| {
+        std::array::from_fn(|k| 0.5 * f64::from(u8::from(k == a) + u8::from(k == b)))
+    }));
+    let numbers: String = (1..=10).map(|tag| format!("{tag}\n")).collect();
+    let places: String = nodes
+        .iter()
+        .map(|l| {
+            let (r, y, t) = (0.1 * l[1], l[2], l[3]);
+            let (x, z) = (t * t + r * (1.0 - 2.1 * t), t - 1.05 * t * t - 2.0 * r * t);
+            format!("{x} {y} {z}\n")
+        })
+        .collect();
+    format!(
+        "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n\
+         $PhysicalNames\n3\n2 1 \"fixed\"\n2 2 \"contact\"\n3 3 \"body\"\n$EndPhysicalNames\n\
+         $Entities\n0 0 2 1\n1 0 0 0 1 1 1 1 1 0\n2 0 0 0 1 1 1 1 2 0\n1 0 0 0 1 1 1 1 3 0\n\
+         $EndEntities\n$Nodes\n1 10 1 10\n3 1 0 10\n{numbers}{places}$EndNodes\n\
+         $Elements\n3 3 1 12\n2 1 9 1\n1 1 3 2 7 6 5\n2 2 9 1\n2 2 3 4 6 9 10\n3 1 11 1\n\
+         12 1 2 3 4 5 6 7 8 9 10\n$EndElements\n"
+    )
+}
+
+#[test]
+fn an_order_at_which_an_element_turns_over_is_refused_with_its_tag() {
+    let dir = tempfile::tempdir().unwrap();
+    fs::write(dir.path().join("bent.msh"), bent_over_mesh()).unwrap();
+    let scene = scene_with(dir.path(), |text| {
+        set(&set(text, "mesh", "\"bent.msh\""), "order", "1")
+    });
+    let outcome = run(&scene);
+    assert_eq!(outcome.code, 2, "{}", outcome.err);
+    for part in [
+        "bent.msh: element 12 becomes inverted or flat at order 1",
+        "ask for order = 2",
+    ] {
+        assert!(outcome.err.contains(part), "{}", outcome.err);
+    }
+}
+
+#[test]
+fn a_part_without_interface_nodes_cannot_constrain_them() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = scene_with(dir.path(), |text| {
+        set(text, "order", "1")
+            + "[accuracy]\nadaptive = { method = \"constrain\", radius = 0.001 }\n"
+    });
+    let outcome = run(&scene);
+    assert_eq!(outcome.code, 2, "{}", outcome.err);
+    assert!(
+        outcome
+            .err
+            .contains("no interface nodes to constrain; set accuracy.order to 2"),
+        "{}",
+        outcome.err
+    );
+}

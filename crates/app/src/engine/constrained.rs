@@ -126,10 +126,12 @@ impl FreeSettings {
 fn work_of_step(n_free: usize) -> f64 {
     let rows = 3.0 * n_free as f64;
     let m = TYPICAL_ROWS as f64;
-    // A candidate that comes near, and another set in the making.
-    let comes_near = 3.0 * rows * rows / 2.0 + 9.0 * m * rows;
+    // Two candidates that come near, the amplitudes for a new watch list and its displacements, and
+    // another set in the making.
+    let comes_near = 2.0 * (3.0 * rows * rows / 2.0 + 9.0 * m * rows);
+    let watch_list = rows * rows + 3.0 * 4.0 * m * rows;
     let build = (rows * rows * rows / 6.0 + 3.0 * m * rows * rows / 2.0) / BUILD_STEPS as f64;
-    comes_near + build.clamp(LEAST_WORK as f64, MOST_WORK as f64)
+    comes_near + watch_list + build.clamp(LEAST_WORK as f64, MOST_WORK as f64)
 }
 
 /// What happens with the free set.
@@ -321,10 +323,10 @@ impl Constrained {
         match self.stage {
             Stage::Steady => self.begin_build(near),
             Stage::Build => {
-                if self
+                let is_built = self
                     .next
-                    .build(&self.data, &self.needed, self.work_per_step)
-                {
+                    .build(&self.data, &self.needed, self.work_per_step);
+                if is_built && !self.need_more(near) {
                     self.stage = Stage::Ramp;
                     self.blend = 0.0;
                     // Only what is near now will be blended.
@@ -333,6 +335,16 @@ impl Constrained {
             }
             Stage::Ramp => {}
         }
+    }
+
+    /// Lists candidates that came near while the next operator was made; false if there are none.
+    fn need_more(&mut self, near: &[u32]) -> bool {
+        let next = &mut self.next;
+        self.needed.clear();
+        let missing = near.iter().copied().filter(|c| !next.has_columns(*c));
+        self.needed.extend(missing.take(next.n_left()));
+        next.begin_columns();
+        !self.needed.is_empty()
     }
 
     /// Begins a switch if the chosen set is another one than the operator's.

@@ -57,6 +57,20 @@ impl FreeOperator {
         self.next_needed = 0;
     }
 
+    pub(super) fn has_columns(&self, candidate: u32) -> bool {
+        self.pairs.slot(candidate).is_some()
+    }
+
+    /// Candidates that can still have columns.
+    pub(super) fn n_left(&self) -> usize {
+        self.pairs.n_left()
+    }
+
+    /// Makes the next [`Self::build`] begin its list of candidates.
+    pub(super) fn begin_columns(&mut self) {
+        self.next_needed = 0;
+    }
+
     /// Forgets the columns, not the factor.
     pub(super) fn clear_columns(&mut self) {
         self.pairs.clear();

@@ -87,9 +87,8 @@ impl FreeNodes {
     }
 
     /// Nodes that the next [`Self::sweep`] will look at.
-    pub(crate) fn next_slice(&self) -> impl Iterator<Item = usize> + use<> {
-        let (cursor, n) = (self.cursor, self.positions.len());
-        (cursor..cursor + self.slice).map(move |i| i % n)
+    pub(crate) fn next_slice(&self) -> std::ops::Range<usize> {
+        self.cursor..(self.cursor + self.slice).min(self.positions.len())
     }
 
     /// Constrains all.
@@ -111,8 +110,7 @@ impl FreeNodes {
         if contacts.is_empty() || n == 0 || is_idle {
             return;
         }
-        for _ in 0..self.slice {
-            let i = self.cursor;
+        for i in self.next_slice() {
             let (wanted, kept) = match self.rule {
                 Rule::Indicator(limit) => {
                     let bend = bend(i);
@@ -137,10 +135,10 @@ impl FreeNodes {
                 self.is_free[i] = true;
                 self.n_free += 1;
             }
-            self.cursor += 1;
-            if self.cursor == n {
-                self.end_sweep();
-            }
+        }
+        self.cursor = self.next_slice().end;
+        if self.cursor == n {
+            self.end_sweep();
         }
     }
 

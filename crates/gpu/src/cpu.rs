@@ -1,5 +1,7 @@
 //! The back-end on the processor, with the compliance kept in 64 or 32 bits.
 
+use std::ops::Range;
+
 use crate::error::Error;
 use crate::layout::{Layout, check_length};
 use crate::multiply::{Multiply, Scalar};
@@ -122,7 +124,7 @@ impl<T: Stored> Multiply for Cpu<T> {
         displacement: &mut [f64],
     ) -> Result<(), Error> {
         self.check(columns, forces, displacement)?;
-        self.add_first(columns, forces, displacement);
+        self.multiply_range(columns, forces, 0..self.layout.n_rows(), displacement);
         Ok(())
     }
 
@@ -141,22 +143,11 @@ impl<T: Stored> Multiply for Cpu<T> {
             let row = n_first.max(largest) - 1;
             return Err(Error::NoSuchRow { row, n_rows });
         }
-        self.add_first(columns, forces, &mut displacement[..3 * n_first]);
-        for &row in rows {
-            displacement[3 * row as usize..][..3].fill(0.0);
-        }
-        // Candidate by candidate: its three columns stay at hand, and rows do not wait for each other.
-        for (&candidate, f) in columns.iter().zip(forces.chunks_exact(3)) {
-            let [a, b, c] = self.columns_of(candidate);
-            let [x, y, z] = [f[0], f[1], f[2]].map(|f| f * self.unit);
-            for &row in rows {
-                let at = 3 * row as usize;
-                let sums = &mut displacement[at..at + 3];
-                let (a, b, c) = (&a[at..at + 3], &b[at..at + 3], &c[at..at + 3]);
-                for k in 0..3 {
-                    sums[k] += a[k].to_f64() * x + b[k].to_f64() * y + c[k].to_f64() * z;
-                }
-            }
+        self.multiply_range(columns, forces, 0..n_first, displacement);
+        // Rows that follow each other are one stretch.
+        for run in rows.chunk_by(|a, b| a + 1 == *b) {
+            let first = run[0] as usize;
+            self.multiply_range(columns, forces, first..first + run.len(), displacement);
         }
         Ok(())
     }
@@ -180,8 +171,17 @@ impl<T: Stored> Cpu<T> {
         }
     }
 
-    /// Displacement of the first rows, as many as `displacement` holds.
-    fn add_first(&self, columns: &[u32], forces: &[f64], displacement: &mut [f64]) {
+    /// Displacement of a stretch of rows.
+    fn multiply_range(
+        &self,
+        columns: &[u32],
+        forces: &[f64],
+        rows: Range<usize>,
+        displacement: &mut [f64],
+    ) {
+        let rows = 3 * rows.start..3 * rows.end;
+        let displacement = &mut displacement[rows.clone()];
+        let columns_of = |candidate: u32| self.columns_of(candidate).map(|c| &c[rows.clone()]);
         // Two candidates at a time: six columns for one load and store of the sums, which stay in the
         // cache, so that only the compliance is read from memory. Cutting the columns into tiles of
         // 8 to 32 KB of sums gained nothing.
@@ -189,14 +189,14 @@ impl<T: Stored> Cpu<T> {
         let mut pairs = columns.chunks_exact(2);
         let mut pair_forces = forces.chunks_exact(6);
         for (pair, f) in pairs.by_ref().zip(pair_forces.by_ref()) {
-            let [a, b, c] = self.columns_of(pair[0]);
-            let [d, e, g] = self.columns_of(pair[1]);
+            let [a, b, c] = columns_of(pair[0]);
+            let [d, e, g] = columns_of(pair[1]);
             let f = [f[0], f[1], f[2], f[3], f[4], f[5]].map(|f| f * self.unit);
             add_six(displacement, [a, b, c, d, e, g], f);
         }
         if let (&[candidate], &[x, y, z]) = (pairs.remainder(), pair_forces.remainder()) {
             let f = [x, y, z].map(|f| f * self.unit);
-            add_three(displacement, self.columns_of(candidate), f);
+            add_three(displacement, columns_of(candidate), f);
         }
     }
 }

@@ -45,9 +45,9 @@ pub trait Multiply: Send {
 
     /// Displacement of some rows: the first `n_first` and those listed.
     ///
-    /// As [`multiply_into`](Self::multiply_into) for these rows; the others are left as they are. The
-    /// first rows are read in order, a listed one costs about three times as much as one of them.
-    /// `rows`: at or above `n_first`, each once.
+    /// As [`multiply_into`](Self::multiply_into) for these rows; the others are left as they are.
+    /// `rows`: at or above `n_first`. Those that follow each other in the list and in number are read as
+    /// one stretch; a row that stands alone costs several times as much.
     ///
     /// # Errors
     /// As [`multiply_into`](Self::multiply_into), and where a row does not exist.

@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use bytemuck::{cast_slice, cast_slice_mut};
 use fem::{Hierarchy, Rule as Following};
 use glam::DVec3;
 use gpu::{Layout, Multiply, Scalar};
@@ -51,7 +52,17 @@ impl Select {
         let is_principal = |row: &u32| hierarchy.is_principal(loaded.rows[*row as usize]);
         let mut row_of: Vec<u32> = (0..n_rows as u32).filter(is_principal).collect();
         let n_principal = row_of.len();
-        row_of.extend((0..n_rows as u32).filter(|row| !is_principal(row)));
+        // Neighbours in space are neighbours in memory: free nodes are then multiplied in stretches.
+        let place = |row: &u32| loaded.mesh.nodes[loaded.rows[*row as usize] as usize];
+        let mut interface_rows: Vec<u32> = (0..n_rows as u32)
+            .filter(|row| !is_principal(row))
+            .collect();
+        let places: Vec<[f64; 3]> = interface_rows.iter().map(place).collect();
+        let along_curve = morton_numbers(&places);
+        let mut order: Vec<usize> = (0..places.len()).collect();
+        order.sort_by_key(|k| along_curve[*k]);
+        interface_rows = order.into_iter().map(|k| interface_rows[k]).collect();
+        row_of.extend(interface_rows);
 
         let mut place_of_node = vec![u32::MAX; loaded.mesh.n_nodes()];
         for (place, row) in (0..).zip(&row_of) {
@@ -134,40 +145,39 @@ impl Select {
         self.contacts.clear();
         self.contacts
             .extend(columns.iter().map(|c| rest[*c as usize]));
-        let (u, masters, starts, n_principal) =
-            (&self.u, &self.masters, &self.starts, self.n_principal);
+        let (principal, interface) = cast_slice::<f64, DVec3>(&self.u).split_at(self.n_principal);
+        let (masters, starts) = (&self.masters, &self.starts);
         let interpolated = |k: usize| -> DVec3 {
-            masters[starts[k] as usize..starts[k + 1] as usize]
-                .iter()
-                .map(|&(master, weight)| weight * DVec3::from_slice(&u[3 * master as usize..][..3]))
-                .sum()
+            let mut u = DVec3::ZERO;
+            for &(master, weight) in &masters[starts[k] as usize..starts[k + 1] as usize] {
+                u += weight * principal[master as usize];
+            }
+            u
         };
-        let exact_at = |k: usize| DVec3::from_slice(&u[3 * (n_principal + k)..][..3]);
         let largest = if self.free.looks_at_bend() {
-            super::largest(&u[..3 * n_principal])
+            super::largest(&self.u[..3 * self.n_principal])
         } else {
             0.0
         };
         self.free.sweep(
             &self.contacts,
-            |k| (exact_at(k) - interpolated(k)).length(),
+            |k| (interface[k] - interpolated(k)).length(),
             largest,
         );
 
-        let (principal, interface) = self.row_of.split_at(n_principal);
-        for (u, row) in u.chunks_exact(3).zip(principal) {
-            displacement[3 * *row as usize..][..3].copy_from_slice(u);
+        let drawn = cast_slice_mut::<f64, DVec3>(displacement);
+        let (rows, interface_rows) = self.row_of.split_at(self.n_principal);
+        for (row, u) in rows.iter().zip(principal) {
+            drawn[*row as usize] = *u;
         }
-        for (k, row) in interface.iter().enumerate() {
-            let share = self.exact[k];
-            let drawn = if share == 0.0 {
+        for (k, (row, share)) in interface_rows.iter().zip(&self.exact).enumerate() {
+            drawn[*row as usize] = if *share == 0.0 {
                 interpolated(k)
-            } else if share == 1.0 {
-                exact_at(k)
+            } else if *share == 1.0 {
+                interface[k]
             } else {
-                interpolated(k).lerp(exact_at(k), share)
+                interpolated(k).lerp(interface[k], *share)
             };
-            displacement[3 * *row as usize..][..3].copy_from_slice(&drawn.to_array());
         }
         for (share, is_free) in self.exact.iter_mut().zip(self.free.is_free()) {
             let towards = if *is_free { 1.0 } else { -1.0 };
@@ -185,14 +195,39 @@ impl Select {
             n_principal,
             ..
         } = self;
-        let row = |k: usize| (*n_principal + k) as u32;
+        let looked_at = if free.looks_at_bend() {
+            free.next_slice()
+        } else {
+            0..0
+        };
         listed.clear();
-        let is_wanted = |k: usize| free.is_free()[k] || exact[k] > 0.0;
-        listed.extend((0..exact.len()).filter(|k| is_wanted(*k)).map(row));
-        if free.looks_at_bend() {
-            listed.extend(free.next_slice().filter(|k| !is_wanted(*k)).map(row));
+        for (k, (is_free, exact)) in free.is_free().iter().zip(exact).enumerate() {
+            if *is_free || *exact > 0.0 || looked_at.contains(&k) {
+                listed.push((*n_principal + k) as u32);
+            }
         }
     }
+}
+
+/// Numbers along a space-filling curve (Morton's): near numbers are near places.
+fn morton_numbers(places: &[[f64; 3]]) -> Vec<u32> {
+    const BITS: u32 = 10;
+    let low: [f64; 3] =
+        std::array::from_fn(|c| places.iter().map(|x| x[c]).fold(f64::INFINITY, f64::min));
+    let size = places
+        .iter()
+        .flat_map(|x| (0..3).map(|c| x[c] - low[c]))
+        .fold(f64::MIN_POSITIVE, f64::max);
+    let number = |x: &[f64; 3]| {
+        let cell = |c: usize| ((x[c] - low[c]) / size * f64::from((1 << BITS) - 1)) as u32;
+        let cells = [cell(0), cell(1), cell(2)];
+        (0..BITS).fold(0, |number, bit| {
+            (0..3).fold(number, |n, c| {
+                n | (cells[c] >> bit & 1) << (3 * bit + c as u32)
+            })
+        })
+    };
+    places.iter().map(number).collect()
 }
 
 /// How many listed rows can be multiplied within `budget_us`, measured here and now, so that the

@@ -103,13 +103,25 @@ impl FreeNodes {
     /// Looks at the next share of the nodes. `contacts`: rest positions of the nodes in contact, m;
     /// without any, nothing changes. `bend(i)`: how far node `i` would be from where it is, were it
     /// constrained, m, asked for only if the rule needs it; `largest`: the largest displacement, m.
-    /// Does not allocate.
-    pub(crate) fn sweep(&mut self, contacts: &[DVec3], bend: impl Fn(usize) -> f64, largest: f64) {
+    /// Returns whether a node changed. Does not allocate.
+    pub(crate) fn sweep(
+        &mut self,
+        contacts: &[DVec3],
+        bend: impl Fn(usize) -> f64,
+        largest: f64,
+    ) -> bool {
         let n = self.positions.len();
         let is_idle = self.n_free == 0 && (self.max_free == 0 || self.rule == Rule::Radius(0.0));
         if contacts.is_empty() || n == 0 || is_idle {
-            return;
+            return false;
         }
+        let mut has_changed = false;
+        let (low, high) = contacts
+            .iter()
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(a, b), x| {
+                (a.min(*x), b.max(*x))
+            });
+        let kept_within = (LOOSE_RADIUS * self.radius).powi(2);
         for i in self.next_slice() {
             let (wanted, kept) = match self.rule {
                 Rule::Indicator(limit) => {
@@ -117,29 +129,32 @@ impl FreeNodes {
                     (bend > limit * largest, bend > LOOSE_BEND * limit * largest)
                 }
                 Rule::Radius(_) | Rule::Nearest => {
-                    let squared = contacts
-                        .iter()
-                        .map(|c| (self.positions[i] - *c).length_squared())
-                        .fold(f64::INFINITY, f64::min);
-                    (
-                        squared < self.radius * self.radius,
-                        squared < (LOOSE_RADIUS * self.radius).powi(2),
-                    )
+                    let x = self.positions[i];
+                    // Most nodes are farther than the box of all contacts.
+                    let mut squared = (x - x.clamp(low, high)).length_squared();
+                    if squared < kept_within {
+                        let to = |c: &DVec3| (x - *c).length_squared();
+                        squared = contacts.iter().map(to).fold(f64::INFINITY, f64::min);
+                    }
+                    (squared < self.radius * self.radius, squared < kept_within)
                 }
             };
             self.n_within += usize::from(wanted);
             if self.is_free[i] && !kept {
                 self.is_free[i] = false;
                 self.n_free -= 1;
+                has_changed = true;
             } else if !self.is_free[i] && wanted && self.n_free < self.max_free {
                 self.is_free[i] = true;
                 self.n_free += 1;
+                has_changed = true;
             }
         }
         self.cursor = self.next_slice().end;
         if self.cursor == n {
             self.end_sweep();
         }
+        has_changed
     }
 
     /// Steers the radius towards as many nodes as are allowed.

@@ -34,6 +34,8 @@ pub(super) struct Select {
     starts: Vec<u32>,
     /// By interface row: 0 where interpolated, 1 where exact, between while it moves.
     exact: Vec<f64>,
+    /// Whether some are between, or have just arrived.
+    is_moving: bool,
     /// Rows that are multiplied beside the principal ones.
     listed: Vec<u32>,
     contacts: Vec<DVec3>,
@@ -115,6 +117,7 @@ impl Select {
             masters,
             starts,
             exact: vec![0.0; n_interface],
+            is_moving: true,
             listed: Vec::with_capacity(n_interface),
             contacts: Vec::with_capacity(n_candidates),
             u: vec![0.0; 3 * n_rows],
@@ -133,7 +136,9 @@ impl Select {
         forces: &[f64],
         displacement: &mut [f64],
     ) -> Result<(), Error> {
-        self.list_rows();
+        if self.is_moving || self.free.looks_at_bend() {
+            self.list_rows();
+        }
         self.multiply.multiply_rows_into(
             columns,
             forces,
@@ -159,7 +164,7 @@ impl Select {
         } else {
             0.0
         };
-        self.free.sweep(
+        let has_changed = self.free.sweep(
             &self.contacts,
             |k| (interface[k] - interpolated(k)).length(),
             largest,
@@ -179,9 +184,14 @@ impl Select {
                 interpolated(k).lerp(interface[k], *share)
             };
         }
-        for (share, is_free) in self.exact.iter_mut().zip(self.free.is_free()) {
-            let towards = if *is_free { 1.0 } else { -1.0 };
-            *share = (*share + towards / BLEND_UPDATES).clamp(0.0, 1.0);
+        if has_changed || self.is_moving {
+            self.is_moving = has_changed;
+            for (share, is_free) in self.exact.iter_mut().zip(self.free.is_free()) {
+                let towards = if *is_free { 1.0 } else { 0.0 };
+                let step = 1.0 / BLEND_UPDATES;
+                self.is_moving |= *share != towards;
+                *share += (towards - *share).clamp(-step, step);
+            }
         }
         Ok(())
     }

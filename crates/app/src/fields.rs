@@ -18,7 +18,7 @@ pub struct FieldSolver<'a> {
 
 #[derive(Debug)]
 enum Solver<'a> {
-    Full(FactoredStiffness),
+    Full(Box<FactoredStiffness>),
     Constrained {
         stiffness: Stiffness,
         coarse: Box<ConstrainedStiffness>,
@@ -37,9 +37,10 @@ impl<'a> FieldSolver<'a> {
         let stiffness = assemble(loaded)?;
         let in_part = |e| Error::part(&loaded.spec.mesh_path, e);
         let solver = match &prepared.bubbles {
-            None => Solver::Full(
-                FactoredStiffness::new(&stiffness, &loaded.supports, progress).map_err(in_part)?,
-            ),
+            None => {
+                let factor = FactoredStiffness::new(&stiffness, &loaded.supports, progress);
+                Solver::Full(Box::new(factor.map_err(in_part)?))
+            }
             Some(bubbles) => {
                 let hierarchy = Hierarchy::of(&loaded.mesh);
                 let all = hierarchy.interface_nodes();

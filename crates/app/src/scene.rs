@@ -130,6 +130,8 @@ pub struct Part {
     pub mesh: PathBuf,
     /// Line of `mesh` in the scene file, for messages.
     pub mesh_line: usize,
+    /// Other meshes of the same part, for the accuracy study; whether they exist is seen there.
+    pub other_meshes: Vec<PathBuf>,
     /// Element order that is asked for, 1, 2 or 3; `None`: the mesh's own.
     pub order: Option<u8>,
     /// Linear elasticity and limits.
@@ -331,8 +333,6 @@ pub struct Accuracy {
     pub scalar: Scalar,
     /// Where the displacement multiply runs.
     pub multiply: Multiply,
-    /// Other meshes of the same part, for the accuracy study; they exist.
-    pub meshes: Vec<PathBuf>,
 }
 
 impl Accuracy {
@@ -348,7 +348,6 @@ impl Accuracy {
             max_contacts: raw::default::MAX_CONTACTS as usize,
             scalar: Scalar::F64,
             multiply: Multiply::Auto,
-            meshes: Vec::new(),
         };
         let where_seen = Adaptive::On {
             method: PMethod::Select,

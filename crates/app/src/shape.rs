@@ -51,7 +51,13 @@ impl Shape {
         };
         let mut n_columns = n_candidates;
         let kind = match (accuracy.adaptive, &prepared.bubbles) {
-            (Adaptive::On { method, .. }, Some(bubbles)) if method == PMethod::Constrain => {
+            (
+                Adaptive::On {
+                    method: PMethod::Constrain,
+                    ..
+                },
+                Some(bubbles),
+            ) => {
                 n_columns = n_columns.max(bubbles.bubbles.len());
                 Kind::Constrained {
                     coarse: upload(n_candidates, &bubbles.coarse)?,

@@ -116,13 +116,13 @@ fn a_constrained_part_with_all_nodes_free_is_the_full_part() {
     let whole = clip(Adaptive::Off);
     let free = clip(on(PMethod::Constrain, 1.0));
     let plain = whole.engine();
-    let coupling = plain.coupling().cloned();
+    let coupling = plain.coupling().copied();
     // Planes of both converged far beyond what a scene asks for, so that only the operators differ.
     let mut engine_settings = plain.settings().clone();
     engine_settings.displacement_tolerance = 1e-14;
     let part = Arc::new(whole.prepared.contact_part());
     let (tool, _) = setup::tool(&whole.scene).unwrap();
-    let mut engine = Engine::new(part, tool, coupling.clone(), engine_settings.clone()).unwrap();
+    let mut engine = Engine::new(part, tool, coupling, engine_settings.clone()).unwrap();
     let (coarse, data) = free
         .prepared
         .constrained_part(free.prepared.bubbles.as_ref().unwrap());

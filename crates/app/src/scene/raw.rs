@@ -156,6 +156,11 @@ pub(super) struct PartRaw {
     /// nodes lie on the mesh's curved edges and faces. The same as `accuracy.order`.
     #[schemars(range(min = 1, max = 3), extend("x-default" = "the mesh's own"))]
     pub(super) order: Option<At<i64>>,
+    /// Other meshes of the same part with the same groups, coarser or finer, relative to the scene
+    /// file: an axis of `snapin accuracy`, which is the only command that reads them.
+    #[serde(default)]
+    #[schemars(extend("x-default" = "none"))]
+    pub(super) other_meshes: Vec<String>,
     /// Material of the part; may be its own section `[part.material]`.
     pub(super) material: MaterialRaw,
     /// What is held: the name of a physical group of the mesh, or a list of names and of tables

@@ -518,19 +518,6 @@ fn refusals_name_line_key_and_mend() {
     }
 }
 
-/// Meshes of the accuracy study must be there too.
-#[test]
-fn a_mesh_of_the_study_that_is_not_there_is_told() {
-    let text = adding("[accuracy]\nmeshes = [\"none.msh\"]\n")
-        .unwrap_err()
-        .to_string();
-    assert!(
-        text.contains("clip.toml:22: accuracy.meshes file"),
-        "{text}"
-    );
-    assert!(text.contains("none.msh does not exist"), "{text}");
-}
-
 /// A preset is what its settings are, and a key beside it takes precedence.
 #[test]
 fn a_preset_sets_all_and_a_key_beside_it_wins() {

@@ -245,6 +245,11 @@ impl Check<'_> {
         Ok(Part {
             mesh: self.file("mesh", &raw.mesh, mend)?,
             mesh_line: line_of(self.source, raw.mesh.offset),
+            other_meshes: {
+                let folder = self.path.parent().unwrap_or(Path::new(""));
+                let names = raw.other_meshes.iter();
+                names.map(|name| folder.join(name)).collect()
+            },
             order,
             material,
             fixed,

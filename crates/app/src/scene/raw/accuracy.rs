@@ -241,10 +241,6 @@ pub(in crate::scene) struct AccuracyKeys {
     /// the free nodes, for comparison). Example: `{ method = "constrain", radius = 3.0 }`.
     #[schemars(extend("x-quantity" = "length", "default" = "off"))]
     pub(in crate::scene) adaptive: Option<At<AdaptiveRaw>>,
-    /// Other meshes of the same part with the same groups, relative to the scene file: an axis of
-    /// `snapin accuracy`.
-    #[schemars(extend("x-default" = "none"))]
-    pub(in crate::scene) meshes: Option<Vec<At<String>>>,
     /// How often contact planes are put on anew at the new positions within one step: until the
     /// displacement no longer changes, or 1 to 50 times.
     #[schemars(extend("default" = "converged"))]

@@ -35,8 +35,6 @@ impl Check<'_> {
         let max_contacts = most.map_or(Ok(default::MAX_CONTACTS), |at| {
             self.integer("max_contacts", at, 1, 5000)
         })?;
-        let mend = "paths are relative to the scene file";
-        let meshes = raw.meshes.iter().flatten();
         Ok(Accuracy {
             preset,
             budget_us: match &raw.budget_us {
@@ -66,9 +64,6 @@ impl Check<'_> {
                 Some(MultiplyRaw::Cpu) => Multiply::Cpu,
                 _ => Multiply::Auto,
             },
-            meshes: meshes
-                .map(|at| self.file("accuracy.meshes", at, mend))
-                .collect::<Result<_, _>>()?,
         })
     }
 

@@ -1,6 +1,7 @@
 //! The command line. Each command turns typed arguments into meaning before any work; errors and
 //! exit codes meet here: 0 done, 1 result out of tolerance, 2 usage or input error, 130 Ctrl-C.
 
+mod accuracy;
 mod doctor;
 mod prepare;
 mod run;
@@ -28,6 +29,8 @@ struct Cli {
 enum Command {
     /// Push the tool onto the part with a simulated hand and write a report.
     Run(run::RunArgs),
+    /// Show what accuracy costs in time, for each choice: tables, CSV, plots.
+    Accuracy(accuracy::AccuracyArgs),
     /// Build or check the cached part of a scene; print sizes, times and checks.
     Prepare(prepare::PrepareArgs),
     /// Compare with reference cases: every folder below DIR with case.toml or problem.json.
@@ -94,6 +97,7 @@ pub fn run(
     let ui = Ui::new(err, std::io::stderr().is_terminal());
     let result = match &cli.command {
         Command::Run(args) => run::run(args, out, &ui),
+        Command::Accuracy(args) => accuracy::run(args, out, &ui),
         Command::Prepare(args) => prepare::run(args, out, &ui),
         Command::Verify(args) => verify::run(args, out, &ui),
         Command::Scene(args) => show_scene_keys(args, out),

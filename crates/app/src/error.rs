@@ -64,6 +64,11 @@ impl Error {
         }
     }
 
+    /// Whether the user stopped it.
+    pub(crate) fn is_interrupt(&self) -> bool {
+        self.exit_code() == interrupt::EXIT_CODE
+    }
+
     pub(crate) fn part(path: &std::path::Path, source: fem::Error) -> Self {
         if source.is_cancelled() {
             return Self::Interrupted;

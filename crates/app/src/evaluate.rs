@@ -27,6 +27,8 @@ pub(crate) struct Story<'a> {
     pub(crate) engine: &'a Engine,
     pub(crate) recording: &'a Recording,
     pub(crate) remarks: Vec<String>,
+    /// What a time budget was made into.
+    pub(crate) picked: Option<String>,
 }
 
 impl Story<'_> {

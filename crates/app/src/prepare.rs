@@ -115,6 +115,14 @@ impl PreparedPart {
         self.seconds.iter().map(|(_, s)| s).sum()
     }
 
+    /// Bytes of what the step and the drawn shape read.
+    pub fn bytes(&self) -> f64 {
+        let of_bubbles = self.bubbles.as_ref().map_or(0.0, |b| {
+            BubbleCompliance::bytes(b.candidates.len(), b.rows.len(), b.bubbles.len())
+        });
+        8.0 * self.compliance.blocks.len() as f64 + of_bubbles
+    }
+
     /// What the engine needs of the part with constrained interface nodes.
     pub fn constrained_part(&self, bubbles: &BubbleCompliance) -> (ContactPart, BubbleData) {
         let at = |node: &u32| DVec3::from_array(self.loaded.mesh.nodes[*node as usize]);

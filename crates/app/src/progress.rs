@@ -30,6 +30,22 @@ impl<'a> Ui<'a> {
         let _ = writeln!(self.err.borrow_mut(), "{line}");
     }
 
+    /// Where long work is, on a terminal only; the next one takes its place.
+    pub fn status(&self, line: &str) {
+        if self.bars {
+            // Column 1, and what was there is wiped out.
+            let _ = write!(self.err.borrow_mut(), "\r\x1b[2K{line}");
+            let _ = self.err.borrow_mut().flush();
+        }
+    }
+
+    /// Ends [`Self::status`].
+    pub fn end_status(&self) {
+        if self.bars {
+            let _ = write!(self.err.borrow_mut(), "\r\x1b[2K");
+        }
+    }
+
     /// A bar (or nothing) that long work advances.
     pub fn progress(&self) -> Progress {
         Progress {

@@ -13,6 +13,7 @@ pub mod plot;
 pub mod render;
 pub mod summary;
 pub mod vtu;
+pub mod work_precision;
 
 mod font;
 #[cfg(test)]

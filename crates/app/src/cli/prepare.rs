@@ -13,6 +13,7 @@ use crate::prepare::{PreparedPart, prepare};
 use crate::progress::Ui;
 use crate::scene::Scene;
 use crate::setup;
+use crate::study::accuracy::resolved;
 
 #[derive(Debug, Args)]
 pub(super) struct PrepareArgs {
@@ -30,11 +31,10 @@ pub(super) struct PrepareArgs {
 
 pub(super) fn run(args: &PrepareArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u8, Error> {
     let scene = Scene::load(&args.scene)?;
-    let prepared = prepare(
-        &setup::part_spec(&scene)?,
-        &args.cache.options(args.rebuild),
-        ui,
-    )?;
+    let options = args.cache.options(args.rebuild);
+    let (scene, picked) = resolved(scene, &options, ui)?;
+    picked.iter().for_each(|line| ui.note(line));
+    let prepared = prepare(&setup::part_spec(&scene)?, &options, ui)?;
     print(
         out,
         &if args.json {

@@ -14,6 +14,7 @@ use crate::progress::Ui;
 use crate::report::{Curve, Run, summary, write_all};
 use crate::scene::Scene;
 use crate::shape::Shape;
+use crate::study::accuracy::resolved;
 use crate::{Error, session, setup};
 
 #[derive(Debug, Args)]
@@ -42,8 +43,11 @@ pub(super) fn run(args: &RunArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u8
     // Whether the result can be written is known before an hour of preparing.
     let staging = Staging::new(&target)?;
 
+    let options = args.cache.options(false);
+    let (scene, picked) = resolved(scene, &options, ui)?;
     let (tool, remarks) = setup::tool(&scene)?;
-    let prepared = prepare(&setup::part_spec(&scene)?, &args.cache.options(false), ui)?;
+    picked.iter().for_each(|line| ui.note(line));
+    let prepared = prepare(&setup::part_spec(&scene)?, &options, ui)?;
     let mut engine = setup::engine(&scene, &prepared, tool)?;
     let mut spec = setup::session(&scene);
     spec.real_time |= args.real_time;
@@ -56,6 +60,7 @@ pub(super) fn run(args: &RunArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u8
         engine: &engine,
         recording: &recording,
         remarks,
+        picked,
     };
     let run = story.tell(&progress)?;
     drop(progress);

@@ -184,6 +184,7 @@ impl Story<'_> {
              the largest at the integration points."
                 .to_owned(),
         ];
+        notes.extend(self.picked.clone());
         let records = &self.recording.records;
         if self.prepared.bubbles.is_some() {
             let most_free = records.iter().map(|r| r.report.free_nodes).max();

@@ -6,7 +6,9 @@ mod text;
 
 use std::fmt::Write as _;
 
-use self::text::{escaped, push_base64};
+pub(crate) use self::style::STYLE;
+pub(crate) use self::text::escaped;
+use self::text::push_base64;
 use super::curve::Curve;
 use super::data::{Effect, Handbook, PaperStage, Run};
 use super::plot::short;
@@ -42,7 +44,7 @@ pub fn page(run: &Run, curve: &Curve, drawings: &Drawings) -> String {
     page.push_str("<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n");
     page.push_str("<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n");
     let _ = writeln!(page, "<title>{title}: snap-fit report</title>");
-    let _ = writeln!(page, "<style>{}</style></head><body><main>", style::STYLE);
+    let _ = writeln!(page, "<style>{}</style></head><body><main>", STYLE);
     let _ = writeln!(page, "<h1>{title}</h1>");
     let _ = writeln!(page, "<p class=\"where\">{}</p>", escaped(&run.scene_path));
     let _ = writeln!(

@@ -9,25 +9,25 @@ use super::curve::Curve;
 use super::data::{Phase, Run, STAGE_NAMES, StepRow};
 use super::font;
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 /// Colours that stay apart for every common colour vision (Okabe and Ito 2008).
-const BLUE: RGBColor = RGBColor(0, 114, 178);
-const VERMILLION: RGBColor = RGBColor(213, 94, 0);
-const GREEN: RGBColor = RGBColor(0, 158, 115);
-const ORANGE: RGBColor = RGBColor(230, 159, 0);
-const SKY: RGBColor = RGBColor(86, 180, 233);
-const PURPLE: RGBColor = RGBColor(204, 121, 167);
-const INK: RGBColor = RGBColor(34, 34, 34);
-const GREY: RGBColor = RGBColor(120, 120, 120);
-const GRID: RGBColor = RGBColor(225, 225, 225);
+pub(super) const BLUE: RGBColor = RGBColor(0, 114, 178);
+pub(super) const VERMILLION: RGBColor = RGBColor(213, 94, 0);
+pub(super) const GREEN: RGBColor = RGBColor(0, 158, 115);
+pub(super) const ORANGE: RGBColor = RGBColor(230, 159, 0);
+pub(super) const SKY: RGBColor = RGBColor(86, 180, 233);
+pub(super) const PURPLE: RGBColor = RGBColor(204, 121, 167);
+pub(super) const INK: RGBColor = RGBColor(34, 34, 34);
+pub(super) const GREY: RGBColor = RGBColor(120, 120, 120);
+pub(super) const GRID: RGBColor = RGBColor(225, 225, 225);
 
 /// Size of a plot as it is shown, pixels.
-const SIZE: (i32, i32) = (960, 540);
+pub(super) const SIZE: (i32, i32) = (960, 540);
 
 /// The plot library rounds to whole units, which would show as steps in slanted lines: it gets
 /// this many units per pixel.
-const FINE: i32 = 8;
+pub(super) const FINE: i32 = 8;
 
 /// Points of a line beyond which only extremes within equal stretches are drawn.
 const MAX_POINTS: usize = 2_000;
@@ -231,7 +231,7 @@ fn share(nines: f64) -> String {
 }
 
 /// At most three significant digits, without trailing zeros.
-pub(super) fn short(value: f64) -> String {
+pub(crate) fn short(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return if value == 0.0 {
             "0".into()
@@ -254,15 +254,15 @@ pub(super) fn short(value: f64) -> String {
 
 /// A line of the legend.
 #[derive(Clone, Debug)]
-struct Key {
+pub(super) struct Key {
     label: String,
     colour: RGBColor,
     width: i32,
-    is_dashed: bool,
+    pub(super) is_dashed: bool,
 }
 
 impl Key {
-    fn new(label: &str, colour: RGBColor, width: i32) -> Self {
+    pub(super) fn new(label: &str, colour: RGBColor, width: i32) -> Self {
         Self {
             label: label.to_owned(),
             colour,
@@ -277,7 +277,7 @@ impl Key {
 }
 
 /// Draws on white, with the legend in a line above the plot, and hands the SVG text back.
-fn draw(
+pub(super) fn draw(
     keys: &[Key],
     content: impl FnOnce(&Area<'_>) -> Result<(), Box<dyn Error>>,
 ) -> Result<String, Box<dyn Error>> {
@@ -326,15 +326,15 @@ fn legend(head: &Area<'_>, keys: &[Key]) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn stroke(colour: RGBColor, width: i32) -> ShapeStyle {
+pub(super) fn stroke(colour: RGBColor, width: i32) -> ShapeStyle {
     colour.stroke_width((width * FINE) as u32)
 }
 
-fn words(size: i32, colour: RGBColor) -> TextStyle<'static> {
+pub(super) fn words(size: i32, colour: RGBColor) -> TextStyle<'static> {
     (font::FAMILY, size * FINE).into_font().color(&colour)
 }
 
-fn empty(root: &Area<'_>) -> Result<(), Box<dyn Error>> {
+pub(super) fn empty(root: &Area<'_>) -> Result<(), Box<dyn Error>> {
     let place = ((SIZE.0 / 2 - 60) * FINE, (SIZE.1 / 2 - 40) * FINE);
     root.draw(&Text::new("no steps to show", place, words(20, GREY)))
         .map_err(|e| e.to_string().into())

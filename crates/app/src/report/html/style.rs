@@ -1,7 +1,7 @@
 //! Looks of the page.
 
 /// The page's style sheet: readable on a screen, printable, no fonts or pictures from elsewhere.
-pub(super) const STYLE: &str = "
+pub(crate) const STYLE: &str = "
 :root { --ink: #1e2126; --soft: #5b6470; --line: #d9dee4; --paper: #fff; --tint: #f4f6f8; --accent: #0072b2; --alarm: #b34700; --alarm-tint: #fdf3ec; }
 * { box-sizing: border-box; }
 body { margin: 0; background: var(--tint); color: var(--ink); font: 16px/1.5 system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif; }

@@ -1,7 +1,7 @@
 //! Text into HTML and bytes into data addresses.
 
 /// `text` with everything that HTML reads as markup replaced; safe as content and in attributes.
-pub(super) fn escaped(text: &str) -> String {
+pub(crate) fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len() + 16);
     for c in text.chars() {
         match c {

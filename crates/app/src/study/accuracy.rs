@@ -1,0 +1,365 @@
+//! `snapin accuracy`: what accuracy costs in time, for each choice that trades one for the other.
+//!
+//! Every setting is asked the same question: the handle goes along the scene's path, step by step,
+//! and the engine answers with wrenches. They are compared with a reference, an overkill run of the
+//! program's own or a file, and each step is timed. Finished settings are kept in files, so that an
+//! interrupted study goes on where it was.
+
+mod compare;
+mod measure;
+mod page;
+mod pick;
+mod point;
+mod store;
+mod table;
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+pub use compare::{Errors, Reference};
+pub use measure::{Measured, Times};
+pub use page::write;
+pub use pick::{Picked, resolved};
+pub use point::{Axis, NOT_THERE, Point, Setting};
+pub use table::text;
+
+use crate::machine::Machine;
+use crate::prepare::{PrepareOptions, budget::Forecast, load};
+use crate::progress::Ui;
+use crate::scene::{Accuracy, Handle, Preset, Scene};
+use crate::session::part_extent;
+use crate::{Error, interrupt, setup};
+use compare::{Scales, distance, errors};
+use measure::{Course, Samples};
+use store::Store;
+
+/// Seconds that preparing the reference may take by its forecast.
+const REFERENCE_S: f64 = 120.0;
+
+/// What is asked for.
+#[derive(Clone, Debug)]
+pub struct StudyOptions {
+    /// Folder of the result.
+    pub out: PathBuf,
+    /// Which choices.
+    pub axes: Vec<Axis>,
+    /// Values to compare with, instead of an overkill run.
+    pub reference: Option<PathBuf>,
+    /// Where to write the reference for later.
+    pub save_reference: Option<PathBuf>,
+    /// s of timed steps for each setting; `None`: enough for the 99.9 % of a table.
+    pub timed_s: Option<f64>,
+    /// Forget what was finished before.
+    pub fresh: bool,
+}
+
+/// A line of the tables.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// Which choice.
+    pub axis: Axis,
+    /// Which setting.
+    pub label: String,
+    /// Whether it is the scene's own setting.
+    pub is_own: bool,
+    /// Result and errors, or why there is none.
+    pub outcome: Result<(Measured, Errors), String>,
+}
+
+/// The result of the command.
+#[derive(Clone, Debug)]
+pub struct Study {
+    /// Title of the scene.
+    pub title: String,
+    /// Its file.
+    pub scene_path: String,
+    /// The scene's own settings in words.
+    pub own: String,
+    /// Where it ran.
+    pub machine: String,
+    /// By axis.
+    pub rows: Vec<Row>,
+    /// What was compared with.
+    pub reference: Reference,
+    /// N and m: the reference's peak.
+    pub peak: (f64, f64),
+    /// Curves of force (N) over travel (m) for the plot, the reference first.
+    pub curves: Vec<(String, Vec<(f64, f64)>)>,
+    /// Settings that were finished before.
+    pub n_resumed: usize,
+}
+
+/// Runs or resumes a study.
+///
+/// # Errors
+/// What stops the scene's own setting; a reference file that does not fit; Ctrl-C. Other settings that
+/// cannot be run are rows that say why.
+pub fn run(
+    scene: &Scene,
+    options: &StudyOptions,
+    prepare: &PrepareOptions,
+    ui: &Ui<'_>,
+) -> Result<Study, Error> {
+    let mut scene = scene.clone();
+    scene.accuracy.budget_us = None;
+    let scene = &scene;
+    let identity = store::identity(scene)?;
+    let course = Course::of(scene);
+    let reference_file = match &options.reference {
+        Some(file) => Some(store::read_reference(
+            file,
+            scene,
+            &identity,
+            course.targets.len(),
+        )?),
+        None => None,
+    };
+    let folder = options.out.join("points");
+    if options.fresh {
+        let _ = std::fs::remove_dir_all(&folder);
+    }
+    let mut runner = Runner {
+        store: Store::new(&folder, &identity)?,
+        course,
+        samples: None,
+        options,
+        prepare,
+        ui,
+        done: HashMap::new(),
+        n_resumed: 0,
+    };
+    let own = point::base(scene);
+    let loaded = load(&setup::part_spec(scene)?)?;
+    let scales = Scales {
+        direction: match scene.handle {
+            Handle::Tool => scene.hand.direction,
+            Handle::Part => -scene.hand.direction,
+        }
+        .to_array(),
+        lever: part_extent(&loaded.mesh),
+        travel: scene.hand.travel,
+    };
+    runner.run(&own)?;
+    let reference = match reference_file {
+        Some(reference) => reference,
+        None => runner.overkill(scene, &scales)?,
+    };
+    if let Some(file) = &options.save_reference {
+        store::save_reference(file, scene, &identity, &reference)?;
+    }
+
+    let points = point::points(scene, &options.axes, store::own_order(scene)?, scales.lever);
+    let mut rows = Vec::with_capacity(points.len());
+    let begun = Instant::now();
+    for (k, point) in points.iter().enumerate() {
+        runner.tell(
+            k,
+            points.len(),
+            begun,
+            &format!("{} {}", point.axis.name(), point.label),
+        );
+        let outcome = match runner.run(&point.setting) {
+            Ok(measured) => {
+                let errors = errors(&measured, &reference, &scales);
+                Ok((measured, errors))
+            }
+            Err(e) if e.is_interrupt() => return Err(e),
+            Err(e) => Err(e.to_string()),
+        };
+        rows.push(Row {
+            axis: point.axis,
+            label: point.label.clone(),
+            is_own: point.setting.key() == own.key(),
+            outcome,
+        });
+    }
+    let curve = |wrenches: &[[f64; 6]]| -> Vec<(f64, f64)> {
+        let last = wrenches.len().saturating_sub(1).max(1) as f64;
+        let at = |(k, w)| (scales.travel * k as f64 / last, scales.resistance(w));
+        wrenches.iter().enumerate().map(at).collect()
+    };
+    let mut curves = vec![("reference".to_owned(), curve(&reference.wrench))];
+    for row in rows
+        .iter()
+        .filter(|r| matches!(r.axis, Axis::Order | Axis::Mesh))
+    {
+        if let Ok((measured, _)) = &row.outcome {
+            curves.push((row.label.clone(), curve(&measured.wrench)));
+        }
+    }
+    Ok(Study {
+        title: scene.title.clone(),
+        scene_path: scene.path.display().to_string(),
+        own: scene.accuracy.words(),
+        machine: Machine::read().summary(),
+        peak: scales.peak(&reference.wrench),
+        rows,
+        reference,
+        curves,
+        n_resumed: runner.n_resumed,
+    })
+}
+
+/// Runs settings, each once.
+struct Runner<'a, 'u> {
+    store: Store,
+    course: Course,
+    samples: Option<Samples>,
+    options: &'a StudyOptions,
+    prepare: &'a PrepareOptions,
+    ui: &'a Ui<'u>,
+    done: HashMap<String, Result<Measured, String>>,
+    n_resumed: usize,
+}
+
+impl Runner<'_, '_> {
+    fn tell(&self, k: usize, n: usize, begun: Instant, what: &str) {
+        let left = if k == 0 {
+            String::new()
+        } else {
+            let each = begun.elapsed().as_secs_f64() / k as f64;
+            let left = crate::prepare::budget::duration(each * (n - k) as f64);
+            format!(", about {left} left")
+        };
+        self.ui.status(&format!("{} of {n}: {what}{left}", k + 1));
+    }
+
+    /// The setting's result: of this run, of an earlier one, or anew.
+    fn run(&mut self, setting: &Setting) -> Result<Measured, Error> {
+        if interrupt::is_requested() {
+            return Err(Error::Interrupted);
+        }
+        let key = setting.key();
+        if let Some(done) = self.done.get(&key) {
+            return done.clone().map_err(Error::Input);
+        }
+        let outcome = self.run_anew(setting);
+        match &outcome {
+            Ok(measured) => self.done.insert(key, Ok(measured.clone())),
+            Err(e) if e.is_interrupt() => None,
+            Err(e) => self.done.insert(key, Err(e.to_string())),
+        };
+        outcome
+    }
+
+    fn run_anew(&mut self, setting: &Setting) -> Result<Measured, Error> {
+        // The first setting is the scene's own: its nodes are where displacements are compared.
+        let is_first = self.samples.is_none();
+        if let (Some(found), false) = (self.store.find(setting, self.options.timed_s), is_first) {
+            self.n_resumed += 1;
+            return Ok(found);
+        }
+        let mut ready = measure::ready(setting, self.prepare, self.ui)?;
+        let samples = self
+            .samples
+            .get_or_insert_with(|| Samples::of(&ready.prepared));
+        if let (Some(found), true) = (self.store.find(setting, self.options.timed_s), is_first) {
+            self.n_resumed += 1;
+            return Ok(found);
+        }
+        let measured = measure::measure(
+            &mut ready,
+            &setting.scene,
+            &self.course,
+            samples,
+            self.options.timed_s,
+        )?;
+        self.store.keep(setting, self.options.timed_s, &measured)?;
+        Ok(measured)
+    }
+
+    /// The most accurate run that can be prepared in [`REFERENCE_S`], and how wrong it may be.
+    fn overkill(&mut self, scene: &Scene, scales: &Scales) -> Result<Reference, Error> {
+        let exact = |order: u8, refinements: u8| {
+            let mut setting = point::base(scene);
+            point::set_accuracy(&mut setting.scene, Accuracy::of(Some(Preset::Exact)));
+            setting.scene.accuracy.preset = None;
+            setting.scene.part.order = Some(order);
+            setting.refinements = refinements;
+            setting
+        };
+        // Each beside a coarser one, whose difference bounds its error.
+        let ladder = [
+            ((3, 1), (2, 1), "each element in eight at order 3"),
+            ((2, 1), (2, 0), "each element in eight at order 2"),
+            ((3, 0), (2, 0), "the scene's mesh at order 3"),
+        ];
+        for (best, coarser, made) in ladder {
+            let setting = exact(best.0, best.1);
+            if self.store.find(&setting, self.options.timed_s).is_none()
+                && !can_be_prepared(&setting)?
+            {
+                continue;
+            }
+            self.ui.status(&format!("reference: {made}"));
+            let (Ok(fine), Ok(coarse)) =
+                (self.run(&setting), self.run(&exact(coarser.0, coarser.1)))
+            else {
+                if interrupt::is_requested() {
+                    return Err(Error::Interrupted);
+                }
+                continue;
+            };
+            return Ok(Reference {
+                made: format!(
+                    "{made} ({} nodes), planes converged, LCP to 1e-13",
+                    fine.nodes
+                ),
+                bar: Some(distance(&coarse.wrench, &fine.wrench, scales)),
+                bar_made: format!(
+                    "difference from {} nodes at order {}, which Richardson's rule takes for the \
+                     error at first order and for more than it above",
+                    coarse.nodes, coarse.order
+                ),
+                wrench: fine.wrench,
+                potential: fine.potential,
+                displacement: fine.displacement,
+            });
+        }
+        let own = self.run(&point::base(scene))?;
+        Ok(Reference {
+            made: "the scene's own setting: nothing finer could be prepared".to_owned(),
+            bar: None,
+            bar_made: "not known: errors are differences within the scene's mesh".to_owned(),
+            wrench: own.wrench,
+            potential: own.potential,
+            displacement: own.displacement,
+        })
+    }
+}
+
+/// Whether the forecast of preparing is within [`REFERENCE_S`] and memory.
+fn can_be_prepared(setting: &Setting) -> Result<bool, Error> {
+    let mut spec = setup::part_spec(&setting.scene)?;
+    spec.refinements = setting.refinements;
+    let Ok(loaded) = load(&spec) else {
+        return Ok(false);
+    };
+    let forecast = Forecast::of(&loaded);
+    Ok(forecast.seconds < REFERENCE_S && forecast.refuse_what_cannot_fit(&loaded).is_ok())
+}
+
+/// A folder that results may be written into: new, empty, or of an earlier study.
+///
+/// # Errors
+/// A file, or a folder that holds something else.
+pub fn check_folder(out: &Path) -> Result<(), Error> {
+    let refuse = |what: &str| {
+        Err(Error::Input(format!(
+            "{}: {what}; name another folder with --out",
+            out.display()
+        )))
+    };
+    if out.is_file() {
+        return refuse("is a file, not a folder");
+    }
+    let Ok(mut entries) = std::fs::read_dir(out) else {
+        return Ok(());
+    };
+    let is_ours = out.join("points").is_dir();
+    if entries.next().is_some() && !is_ours {
+        return refuse("holds files that are no result of `snapin accuracy`, so it is left alone");
+    }
+    Ok(())
+}

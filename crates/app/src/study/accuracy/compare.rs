@@ -1,0 +1,232 @@
+//! Errors of a setting against the reference.
+
+use serde::{Deserialize, Serialize};
+
+use super::measure::Measured;
+
+/// How far a setting is from the reference. `None`: not comparable.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Errors {
+    /// ‖w - w_ref‖ / ‖w_ref‖ over the path, torques divided by the part's extent.
+    pub wrench_l2: f64,
+    /// Largest difference of the wrench over the largest of the reference.
+    pub wrench_max: f64,
+    /// (peak - peak_ref) / peak_ref of the force along the approach.
+    pub peak: f64,
+    /// m, travel of the handle at the peak, minus that of the reference.
+    pub peak_travel: f64,
+    /// ‖u - u_ref‖ / ‖u_ref‖ of the drawn displacement where the part can touch.
+    pub displacement: Option<f64>,
+    /// sqrt(2 |Π - Π_ref|) / sqrt(2 Π_ref) at the peak of the reference's energy.
+    pub energy: f64,
+}
+
+/// What a setting is compared with.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Reference {
+    /// How it was made.
+    pub made: String,
+    /// Its own error of the wrench, as [`Errors::wrench_l2`]; `None`: not known.
+    pub bar: Option<f64>,
+    /// How the bar was found.
+    pub bar_made: String,
+    /// On the handle by step, as [`Measured::wrench`].
+    pub wrench: Vec<[f64; 6]>,
+    /// J, as [`Measured::potential`].
+    pub potential: Vec<f64>,
+    /// m, as [`Measured::displacement`].
+    pub displacement: Vec<f64>,
+}
+
+/// Direction of the approach and what makes numbers comparable.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Scales {
+    /// Unit vector of the held body's approach, in the frame of the wrenches.
+    pub(super) direction: [f64; 3],
+    /// m, divides torques.
+    pub(super) lever: f64,
+    /// m, of the whole path.
+    pub(super) travel: f64,
+}
+
+impl Scales {
+    fn size(&self, wrench: &[f64; 6]) -> f64 {
+        let scaled = wrench
+            .iter()
+            .enumerate()
+            .map(|(i, x)| if i < 3 { *x } else { x / self.lever });
+        scaled.map(|x| x * x).sum::<f64>().sqrt()
+    }
+
+    /// N, along the approach, positive when it resists.
+    pub(super) fn resistance(&self, wrench: &[f64; 6]) -> f64 {
+        -(0..3).map(|c| wrench[c] * self.direction[c]).sum::<f64>()
+    }
+
+    /// N, m: largest resistance and the handle's travel there.
+    pub(super) fn peak(&self, wrenches: &[[f64; 6]]) -> (f64, f64) {
+        let last = wrenches.len().saturating_sub(1).max(1) as f64;
+        wrenches
+            .iter()
+            .enumerate()
+            .map(|(k, w)| (self.resistance(w), self.travel * k as f64 / last))
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .unwrap_or_default()
+    }
+}
+
+/// Relative distance of two paths of wrenches, root of the mean square.
+pub(super) fn distance(a: &[[f64; 6]], b: &[[f64; 6]], scales: &Scales) -> f64 {
+    let difference: Vec<[f64; 6]> = differences(a, b);
+    let sum = |path: &[[f64; 6]]| path.iter().map(|w| scales.size(w).powi(2)).sum::<f64>();
+    ratio(sum(&difference), sum(b)).sqrt()
+}
+
+fn differences(a: &[[f64; 6]], b: &[[f64; 6]]) -> Vec<[f64; 6]> {
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| std::array::from_fn(|i| a[i] - b[i]))
+        .collect()
+}
+
+/// a / b; nothing over nothing is nothing.
+fn ratio(a: f64, b: f64) -> f64 {
+    if a == 0.0 { 0.0 } else { a / b }
+}
+
+/// Compares along the whole path.
+pub(super) fn errors(measured: &Measured, reference: &Reference, scales: &Scales) -> Errors {
+    let largest = |path: &[[f64; 6]]| path.iter().map(|w| scales.size(w)).fold(0.0, f64::max);
+    let difference = differences(&measured.wrench, &reference.wrench);
+    let (peak, at) = scales.peak(&measured.wrench);
+    let (peak_ref, at_ref) = scales.peak(&reference.wrench);
+    let top = (0..reference.potential.len())
+        .max_by(|a, b| reference.potential[*a].total_cmp(&reference.potential[*b]))
+        .unwrap_or(0);
+    let of = |values: &[f64]| values.get(top).copied().unwrap_or(0.0);
+    let gap = of(&measured.potential) - of(&reference.potential);
+    let same_samples = !reference.displacement.is_empty()
+        && measured.displacement.len() == reference.displacement.len();
+    Errors {
+        wrench_l2: distance(&measured.wrench, &reference.wrench, scales),
+        wrench_max: ratio(largest(&difference), largest(&reference.wrench)),
+        peak: ratio(peak - peak_ref, peak_ref),
+        peak_travel: at - at_ref,
+        displacement: same_samples.then(|| {
+            let squared = |pairs: &mut dyn Iterator<Item = f64>| pairs.map(|x| x * x).sum::<f64>();
+            let (u, v) = (&measured.displacement, &reference.displacement);
+            let apart = squared(&mut u.iter().zip(v).map(|(a, b)| a - b));
+            ratio(apart, squared(&mut v.iter().copied())).sqrt()
+        }),
+        energy: ratio(2.0 * gap.abs(), 2.0 * of(&reference.potential)).sqrt(),
+    }
+}
+
+/// Positions of the settings that no other beats in both time and error, by ascending time.
+pub(super) fn pareto_front(time_and_error: &[(f64, f64)]) -> Vec<usize> {
+    let mut by_time: Vec<usize> = (0..time_and_error.len()).collect();
+    by_time.sort_by(|a, b| {
+        let (a, b) = (time_and_error[*a], time_and_error[*b]);
+        a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
+    });
+    let mut best = f64::INFINITY;
+    by_time
+        .into_iter()
+        .filter(|k| {
+            let is_better = time_and_error[*k].1 < best;
+            best = best.min(time_and_error[*k].1);
+            is_better
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SCALES: Scales = Scales {
+        direction: [0.0, -1.0, 0.0],
+        lever: 0.1,
+        travel: 0.01,
+    };
+
+    fn path(scale: f64) -> Vec<[f64; 6]> {
+        [0.0, 1.0, 4.0, 2.0, -3.0]
+            .map(|f| [0.0, scale * f, 0.0, 0.0, 0.0, 0.0])
+            .to_vec()
+    }
+
+    pub(crate) fn measured(scale: f64) -> Measured {
+        Measured {
+            nodes: 10,
+            elements: 2,
+            order: 2,
+            bytes: 1000.0,
+            prepare_s: Some(0.5),
+            n_timed: 100,
+            step: super::super::measure::Times::default(),
+            shape: super::super::measure::Times::default(),
+            stages: vec![],
+            free_nodes: 0,
+            contacts: 3,
+            not_converged: 0,
+            certificate: 1e-15,
+            switch_change: 0.0,
+            penetration: 1e-6,
+            wrench: path(scale),
+            potential: vec![0.0, 1.0, scale * 4.0, 2.0, 1.0],
+            displacement: vec![scale, 2.0 * scale, 0.0],
+        }
+    }
+
+    fn reference() -> Reference {
+        let of = measured(1.0);
+        Reference {
+            made: "test".to_owned(),
+            bar: None,
+            bar_made: String::new(),
+            wrench: of.wrench,
+            potential: of.potential,
+            displacement: of.displacement,
+        }
+    }
+
+    #[test]
+    fn a_tenth_more_force_is_a_tenth_of_error_everywhere() {
+        let errors = errors(&measured(1.1), &reference(), &SCALES);
+        for error in [
+            errors.wrench_l2,
+            errors.wrench_max,
+            errors.peak,
+            errors.displacement.unwrap(),
+        ] {
+            assert!((error - 0.1).abs() < 1e-12, "{errors:?}");
+        }
+        assert_eq!(errors.peak_travel, 0.0);
+        // Energy a tenth larger: the root of it.
+        assert!((errors.energy - 0.1f64.sqrt()).abs() < 1e-12);
+        assert_eq!(SCALES.peak(&path(1.0)), (4.0, 0.005));
+    }
+
+    #[test]
+    fn a_torque_counts_by_its_lever() {
+        let mut turned = measured(1.0);
+        turned.wrench[2][5] = 0.05;
+        let errors = errors(&turned, &reference(), &SCALES);
+        assert!((errors.wrench_max - 0.5 / 4.0).abs() < 1e-12, "{errors:?}");
+    }
+
+    #[test]
+    fn samples_that_are_not_there_are_not_compared() {
+        let mut other = measured(1.0);
+        other.displacement.clear();
+        assert_eq!(errors(&other, &reference(), &SCALES).displacement, None);
+    }
+
+    #[test]
+    fn the_front_is_what_no_other_beats() {
+        let points = [(1.0, 0.5), (2.0, 0.2), (3.0, 0.3), (2.0, 0.6), (4.0, 0.1)];
+        assert_eq!(pareto_front(&points), [0, 1, 4]);
+        assert!(pareto_front(&[]).is_empty());
+    }
+}

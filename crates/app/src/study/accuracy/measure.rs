@@ -1,0 +1,454 @@
+//! One setting, driven along the scene's path: what it computes and how long it takes.
+
+use std::time::Instant;
+
+use device::Wrench;
+use fem::{Hierarchy, Mesh};
+use glam::DVec3;
+use glamx::DPose3;
+use serde::{Deserialize, Serialize};
+
+use super::point::Setting;
+use crate::engine::{Engine, N_STAGES, Stage};
+use crate::prepare::{PrepareOptions, PreparedPart, prepare};
+use crate::progress::Ui;
+use crate::report::summary::Percentiles;
+use crate::scene::{Handle, Scene};
+use crate::session::part_extent;
+use crate::shape::Shape;
+use crate::{Error, interrupt, setup};
+
+/// Steps of a path at most.
+const MOST_STEPS: usize = 1000;
+
+/// Moments at which displacement and penetration are looked at.
+const MOMENTS: usize = 30;
+
+/// Least time of timed steps with contact, s, and most rounds.
+const TIMED_S: f64 = 0.6;
+const MOST_ROUNDS: usize = 20;
+
+/// How the handle goes: from the start to the end of its travel, without the hand's own motion, so
+/// that all settings are asked the same question.
+#[derive(Clone, Debug)]
+pub(super) struct Course {
+    pub(super) targets: Vec<DPose3>,
+}
+
+impl Course {
+    pub(super) fn of(scene: &Scene) -> Self {
+        let hand = &scene.hand;
+        let per_step = hand.speed * scene.device.servo_period;
+        let n = ((hand.travel / per_step).ceil() as usize).clamp(1, MOST_STEPS);
+        let tool = scene.tool.pose_part_tool;
+        let targets = (0..=n)
+            .map(|k| {
+                let shift = hand.travel * k as f64 / n as f64 * hand.direction;
+                match scene.handle {
+                    Handle::Tool => DPose3 {
+                        translation: tool.translation + shift,
+                        ..tool
+                    },
+                    // The part goes; in its own frame the tool comes.
+                    Handle::Part => DPose3 {
+                        translation: tool.translation - shift,
+                        ..tool
+                    },
+                }
+            })
+            .collect();
+        Self { targets }
+    }
+
+    /// Steps at which displacement and penetration are looked at.
+    fn moments(&self) -> Vec<usize> {
+        let n = self.targets.len();
+        (1..=MOMENTS).map(|i| i * (n - 1) / MOMENTS).collect()
+    }
+}
+
+/// Places of the base mesh at which displacements are compared.
+#[derive(Clone, Debug)]
+pub(super) struct Samples {
+    /// Tag of the node in the base mesh, place, and for a node amid an edge the tags of its ends.
+    places: Vec<(u64, [f64; 3], Option<[u64; 2]>)>,
+    size: f64,
+}
+
+impl Samples {
+    /// The nodes that can touch; of order 1 and 2 only, whose mid nodes are amid their edges.
+    pub(super) fn of(base: &PreparedPart) -> Self {
+        let mesh = &base.loaded.mesh;
+        let hierarchy = Hierarchy::of(mesh);
+        let mut ends = vec![None; mesh.n_nodes()];
+        for edge in hierarchy.edges() {
+            if let [mid] = edge.nodes[..] {
+                ends[mid as usize] = Some(edge.vertices.map(|v| mesh.node_tags[v as usize]));
+            }
+        }
+        let is_compared =
+            |node: &&u32| hierarchy.is_principal(**node) || ends[**node as usize].is_some();
+        let candidates = base.loaded.candidates.iter().filter(is_compared);
+        Self {
+            places: candidates
+                .map(|&node| {
+                    let node = node as usize;
+                    (mesh.node_tags[node], mesh.nodes[node], ends[node])
+                })
+                .collect(),
+            size: part_extent(mesh),
+        }
+    }
+
+    /// For each place the rows whose displacements, weighted, are its own; `None` if this mesh does
+    /// not have the place.
+    fn in_part(&self, part: &PreparedPart) -> Option<Vec<Vec<(usize, f64)>>> {
+        let mesh = &part.loaded.mesh;
+        let mut row_of = vec![None; mesh.n_nodes()];
+        for (row, node) in part.loaded.rows.iter().enumerate() {
+            row_of[*node as usize] = Some(row);
+        }
+        let hierarchy = Hierarchy::of(mesh);
+        let at = |tag: u64, place: Option<[f64; 3]>| -> Option<usize> {
+            let node = mesh.node_of_tag(tag)? as usize;
+            let is_there = place.is_none_or(|x| distance(mesh, node, x) < 1e-9 * self.size);
+            row_of[node].filter(|_| is_there)
+        };
+        self.places
+            .iter()
+            .map(|(tag, place, ends)| {
+                if let Some(row) = at(*tag, Some(*place)) {
+                    return Some(vec![(row, 1.0)]);
+                }
+                // Amid an edge of another order: its own shape functions there.
+                let mut vertices = [
+                    mesh.node_of_tag(ends.as_ref()?[0])?,
+                    mesh.node_of_tag(ends.as_ref()?[1])?,
+                ];
+                vertices.sort_unstable();
+                let row = |node: u32| row_of[node as usize];
+                if hierarchy.edges().is_empty() {
+                    let [a, b] = vertices;
+                    return Some(vec![(row(a)?, 0.5), (row(b)?, 0.5)]);
+                }
+                let found = hierarchy
+                    .edges()
+                    .binary_search_by(|e| e.vertices.cmp(&vertices));
+                let edge = &hierarchy.edges()[found.ok()?];
+                let mut weights = Vec::new();
+                let (of_vertex, of_node) = match edge.nodes.len() {
+                    1 => (0.0, 1.0),
+                    _ => (-1.0 / 16.0, 9.0 / 16.0),
+                };
+                for v in vertices {
+                    weights.push((row(v)?, of_vertex));
+                }
+                for node in &edge.nodes {
+                    weights.push((row(*node)?, of_node));
+                }
+                Some(weights)
+            })
+            .collect()
+    }
+}
+
+fn distance(mesh: &Mesh, node: usize, x: [f64; 3]) -> f64 {
+    let at = mesh.nodes[node];
+    (0..3).map(|c| (at[c] - x[c]).powi(2)).sum::<f64>().sqrt()
+}
+
+/// Percentiles of a time, µs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Times {
+    /// Median.
+    pub p50: f64,
+    /// 99 % are below.
+    pub p99: f64,
+    /// 99.9 % are below.
+    pub p999: f64,
+    /// Longest.
+    pub max: f64,
+}
+
+impl Times {
+    fn of_ns(ns: &[u64]) -> Self {
+        Percentiles::of_ns(ns.iter().copied()).map_or(Self::default(), |p| Self {
+            p50: p.p50,
+            p99: p.p99,
+            p999: p.p999,
+            max: p.max,
+        })
+    }
+}
+
+/// What a setting gives and takes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Measured {
+    /// Nodes of the mesh.
+    pub nodes: usize,
+    /// Elements.
+    pub elements: usize,
+    /// Order of the elements.
+    pub order: u8,
+    /// Bytes of what the step and the drawn shape read.
+    pub bytes: f64,
+    /// s, of preparing; `None` where it came from the cache.
+    pub prepare_s: Option<f64>,
+    /// Steps with contact that were timed.
+    pub n_timed: usize,
+    /// Whole step.
+    pub step: Times,
+    /// Drawn shape.
+    pub shape: Times,
+    /// By stage, in the order of [`Stage::ALL`].
+    pub stages: Vec<Times>,
+    /// Interface nodes that were free at most, where some are not.
+    pub free_nodes: usize,
+    /// Contacts at most.
+    pub contacts: u32,
+    /// Steps whose planes did not come to a stand.
+    pub not_converged: usize,
+    /// Largest natural residual.
+    pub certificate: f64,
+    /// N, largest change of the wrench by switching free nodes.
+    pub switch_change: f64,
+    /// m, deepest that a node was inside the tool.
+    pub penetration: f64,
+    /// On the handle about its point, by step: force (N) and torque (N m).
+    pub wrench: Vec<[f64; 6]>,
+    /// J, strain energy and that of the coupling, by step.
+    pub potential: Vec<f64>,
+    /// m, drawn displacement at the samples by moment; empty if the mesh does not have them.
+    pub displacement: Vec<f64>,
+}
+
+/// A part that is prepared, with what is driven.
+pub(super) struct Ready {
+    pub(super) prepared: PreparedPart,
+    engine: Engine,
+    shape: Shape,
+}
+
+/// Prepares a setting.
+///
+/// # Errors
+/// As preparing and the engine; the study tells them beside the other settings.
+pub(super) fn ready(
+    setting: &Setting,
+    options: &PrepareOptions,
+    ui: &Ui<'_>,
+) -> Result<Ready, Error> {
+    let mut spec = setup::part_spec(&setting.scene)?;
+    spec.refinements = setting.refinements;
+    let prepared = prepare(&spec, options, ui)?;
+    let (tool, _) = setup::tool(&setting.scene)?;
+    let engine = setup::engine(&setting.scene, &prepared, tool)?;
+    let shape = Shape::new(&prepared, &setting.scene.accuracy)?;
+    Ok(Ready {
+        prepared,
+        engine,
+        shape,
+    })
+}
+
+/// Drives a setting along the course: once for its results, then for its times.
+///
+/// # Errors
+/// Ctrl-C.
+pub(super) fn measure(
+    ready: &mut Ready,
+    scene: &Scene,
+    course: &Course,
+    samples: &Samples,
+    timed_s: Option<f64>,
+) -> Result<Measured, Error> {
+    let timed_s = timed_s.unwrap_or(TIMED_S);
+    let Ready {
+        prepared,
+        engine,
+        shape,
+    } = ready;
+    let rows = samples.in_part(prepared);
+    let edges = contact_edges(prepared);
+    let mut contact_wrench = Vec::with_capacity(course.targets.len());
+    let moments = course.moments();
+    let mut found = Measured {
+        nodes: prepared.loaded.mesh.n_nodes(),
+        elements: prepared.loaded.mesh.n_elements(),
+        order: prepared.loaded.mesh.order as u8,
+        bytes: prepared.bytes(),
+        prepare_s: (!prepared.from_cache).then(|| prepared.total_seconds()),
+        n_timed: 0,
+        step: Times::default(),
+        shape: Times::default(),
+        stages: Vec::new(),
+        free_nodes: 0,
+        contacts: 0,
+        not_converged: 0,
+        certificate: 0.0,
+        switch_change: 0.0,
+        penetration: 0.0,
+        wrench: Vec::with_capacity(course.targets.len()),
+        potential: Vec::with_capacity(course.targets.len()),
+        displacement: Vec::new(),
+    };
+
+    // First round: what is computed; it also warms up.
+    engine.reset();
+    for (k, target) in course.targets.iter().enumerate() {
+        let report = engine.step(target);
+        contact_wrench.push(report.contact_wrench_on_tool);
+        let on_tool = Wrench::from_array(&report.contact_wrench_on_tool);
+        let on_handle = on_tool.about(report.tool_pose.translation, target.translation);
+        found.wrench.push(on_handle.to_array());
+        let compliance = [
+            1.0 / scene.coupling.translational_stiffness,
+            1.0 / scene.coupling.rotational_stiffness,
+        ];
+        let of_coupling: f64 = report
+            .coupling_wrench_on_tool
+            .iter()
+            .enumerate()
+            .map(|(i, w)| 0.5 * w * w * compliance[i / 3])
+            .sum();
+        let contacts = engine.active_contacts().to_vec();
+        let of_part: f64 = contacts
+            .iter()
+            .map(|c| {
+                0.5 * c
+                    .force_on_part
+                    .dot(engine.displacement(c.candidate as usize))
+            })
+            .sum();
+        found.potential.push(of_coupling + of_part);
+        found.contacts = found.contacts.max(report.contacts);
+        found.not_converged += usize::from(!report.converged);
+        found.certificate = found.certificate.max(report.certificate);
+        found.switch_change = found.switch_change.max(report.switch_change);
+        let u = shape.update(engine)?;
+        if moments.contains(&k)
+            && let Some(rows) = &rows
+        {
+            for weights in rows {
+                for c in 0..3 {
+                    let of_row = |(row, w): &(usize, f64)| w * u[3 * row + c];
+                    found.displacement.push(weights.iter().map(of_row).sum());
+                }
+            }
+        }
+        let free = shape.n_free().unwrap_or(report.free_nodes as usize);
+        found.free_nodes = found.free_nodes.max(free);
+        if moments.contains(&k) {
+            if interrupt::is_requested() {
+                return Err(Error::Interrupted);
+            }
+            let deepest = penetration(engine, &report.tool_pose, &edges);
+            found.penetration = found.penetration.max(deepest);
+        }
+    }
+
+    let mut times = vec![Vec::new(); N_STAGES + 2];
+    let mut spent = 0.0;
+    for _ in 0..MOST_ROUNDS {
+        if spent > timed_s {
+            break;
+        }
+        if interrupt::is_requested() {
+            return Err(Error::Interrupted);
+        }
+        engine.reset();
+        for (target, wrench) in course.targets.iter().zip(&contact_wrench) {
+            let begun = Instant::now();
+            let report = engine.step(target);
+            let stepped = begun.elapsed();
+            shape.update(engine)?;
+            let all = begun.elapsed();
+            debug_assert_eq!(report.contact_wrench_on_tool, *wrench, "rounds are alike");
+            spent += all.as_secs_f64();
+            if report.contacts == 0 {
+                continue;
+            }
+            for (stage, ns) in report.stage_ns.iter().enumerate() {
+                times[stage].push(*ns);
+            }
+            times[N_STAGES].push(stepped.as_nanos() as u64);
+            times[N_STAGES + 1].push((all - stepped).as_nanos() as u64);
+        }
+    }
+    found.n_timed = times[N_STAGES].len();
+    found.stages = Stage::ALL
+        .iter()
+        .map(|stage| Times::of_ns(&times[*stage as usize]))
+        .collect();
+    found.step = Times::of_ns(&times[N_STAGES]);
+    found.shape = Times::of_ns(&times[N_STAGES + 1]);
+    Ok(found)
+}
+
+/// Edges between candidates, as candidates from one vertex to the other.
+fn contact_edges(prepared: &PreparedPart) -> Vec<Vec<usize>> {
+    let mut candidate_of = vec![None; prepared.loaded.mesh.n_nodes()];
+    for (i, node) in prepared.loaded.candidates.iter().enumerate() {
+        candidate_of[*node as usize] = Some(i);
+    }
+    let hierarchy = Hierarchy::of(&prepared.loaded.mesh);
+    let of_edge = |edge: &fem::Edge| -> Option<Vec<usize>> {
+        let nodes = [edge.vertices[0]]
+            .into_iter()
+            .chain(edge.nodes.iter().copied())
+            .chain([edge.vertices[1]]);
+        nodes.map(|node| candidate_of[node as usize]).collect()
+    };
+    hierarchy.edges().iter().filter_map(of_edge).collect()
+}
+
+/// m, how far the deepest candidate, or point between two on an edge, is inside the tool.
+fn penetration(engine: &mut Engine, tool_pose: &DPose3, edges: &[Vec<usize>]) -> f64 {
+    let n = engine.part().n_candidates();
+    let displaced: Vec<DVec3> = (0..n)
+        .map(|i| engine.part().rest_positions()[i] + engine.displacement(i))
+        .collect();
+    let depth = |x: DVec3| -engine.tool().signed_distance(tool_pose, x).signed_distance;
+    let at_nodes = displaced.iter().map(|x| depth(*x));
+    let between = edges.iter().flat_map(|edge| {
+        let places: Vec<DVec3> = edge.iter().map(|i| displaced[*i]).collect();
+        [0.25, 0.5, 0.75].map(|t| depth(on_edge(&places, t)))
+    });
+    at_nodes.chain(between).fold(0.0, f64::max)
+}
+
+/// The point at `t` of the curve through equally spaced places (Lagrange's interpolation).
+fn on_edge(places: &[DVec3], t: f64) -> DVec3 {
+    let n = places.len();
+    let node = |k: usize| k as f64 / (n - 1) as f64;
+    (0..n)
+        .map(|k| {
+            let others = (0..n).filter(|j| *j != k);
+            let weight: f64 = others
+                .map(|j| (t - node(j)) / (node(k) - node(j)))
+                .product();
+            weight * places[k]
+        })
+        .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_curve_of_three_places_is_a_parabola() {
+        let places = [0.0, 0.5, 1.0].map(|t| DVec3::new(t, t * t, 1.0));
+        let x = on_edge(&places, 0.25);
+        assert!((x - DVec3::new(0.25, 0.0625, 1.0)).length() < 1e-15);
+    }
+
+    #[test]
+    fn times_are_those_of_their_rank() {
+        let times = Times::of_ns(&(1..=1000).map(|k| 1000 * k).collect::<Vec<_>>());
+        assert!((times.p50 - 500.0).abs() <= 1.0, "{times:?}");
+        assert!((times.p999 - 999.0).abs() <= 1.0, "{times:?}");
+        assert_eq!(times.max, 1000.0);
+        assert_eq!(Times::of_ns(&[]), Times::default());
+    }
+}

@@ -1,0 +1,290 @@
+//! The study as files: CSV, JSON, plots and a page.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use serde_json::json;
+
+use super::compare::pareto_front;
+use super::table::{PERIOD_US, cells, csv, name, percent};
+use super::{Axis, Errors, Measured, NOT_THERE, Row, Study, store};
+use crate::Error;
+use crate::report::html::{STYLE, escaped};
+use crate::report::plot::short;
+use crate::report::work_precision::{PlotPoint, Scale, error_over_cost, force_curves};
+
+/// Error of the wrench below which a point is drawn at this value: round-off.
+const LEAST_ERROR: f64 = 1e-9;
+
+/// Writes all files of a study into its folder, each beside and renamed, the page last.
+///
+/// # Errors
+/// What cannot be written; what the plot library says.
+pub fn write(study: &Study, out: &Path) -> Result<(), Error> {
+    let plot_error =
+        |e: Box<dyn std::error::Error>| Error::Input(format!("cannot draw a plot: {e}"));
+    let step = plot(
+        study,
+        "time of a step (µs): hollow 50 %, filled 99.9 % are faster",
+        true,
+        &|m| Some([m.step.p50, m.step.p999]),
+    )
+    .map_err(plot_error)?;
+    let memory = plot(study, "memory that is read (MB)", false, &|m| {
+        Some([1e-6 * m.bytes; 2])
+    })
+    .map_err(plot_error)?;
+    let prepare = plot(study, "preparing (s)", false, &|m| {
+        m.prepare_s.map(|s| [s; 2])
+    })
+    .map_err(plot_error)?;
+    let curves = force_curves(&study.curves).map_err(plot_error)?;
+    store::write(&out.join("accuracy.csv"), &csv(study))?;
+    store::write(&out.join("accuracy.json"), &to_json(study))?;
+    store::write(&out.join("error-over-time.svg"), &step)?;
+    store::write(&out.join("error-over-memory.svg"), &memory)?;
+    store::write(&out.join("error-over-preparing.svg"), &prepare)?;
+    store::write(&out.join("force-curves.svg"), &curves)?;
+    let page = page(study, [&step, &memory, &prepare], &curves);
+    store::write(&out.join("report.html"), &page)
+}
+
+/// Error of the wrench over a cost, a line for each axis that changes either.
+fn plot(
+    study: &Study,
+    cost: &str,
+    is_step: bool,
+    of: &dyn Fn(&Measured) -> Option<[f64; 2]>,
+) -> Result<String, Box<dyn std::error::Error>> {
+    let names: Vec<String> = Axis::ALL.iter().map(|a| a.name().to_owned()).collect();
+    let all: Vec<(&Row, [f64; 2], f64)> = study
+        .rows
+        .iter()
+        .filter_map(|row| {
+            let (measured, errors) = row.outcome.as_ref().ok()?;
+            let cost = of(measured)?.map(|c| c.max(1e-6));
+            Some((row, cost, errors.wrench_l2.max(LEAST_ERROR)))
+        })
+        .collect();
+    let costs: Vec<(f64, f64)> = all.iter().map(|(_, cost, e)| (cost[1], *e)).collect();
+    let front = pareto_front(&costs);
+    // The scene's own setting is on most axes: it is named once.
+    let first_own = all.iter().position(|(row, ..)| row.is_own);
+    let points: Vec<PlotPoint> = all
+        .iter()
+        .enumerate()
+        .map(|(k, (row, cost, error))| PlotPoint {
+            line: Axis::ALL.iter().position(|a| *a == row.axis).unwrap_or(0),
+            label: match row.is_own {
+                true if first_own == Some(k) => "own".to_owned(),
+                true => String::new(),
+                false => row.label.clone(),
+            },
+            cost: *cost,
+            error: *error,
+            is_front: front.contains(&k),
+        })
+        .collect();
+    let scale = Scale {
+        cost: cost.to_owned(),
+        limit: is_step.then_some((PERIOD_US, "1 ms")),
+        bar: study.reference.bar,
+    };
+    error_over_cost(&names, &points, &scale)
+}
+
+fn to_json(study: &Study) -> String {
+    let rows: Vec<_> = study
+        .rows
+        .iter()
+        .map(|row| {
+            let mut value = json!({
+                "axis": row.axis.name(),
+                "setting": row.label,
+                "own": row.is_own,
+            });
+            match &row.outcome {
+                Ok((m, e)) => {
+                    value["status"] = json!("ok");
+                    value["step_us"] = json!(m.step);
+                    value["shape_us"] = json!(m.shape);
+                    value["prepare_s"] = json!(m.prepare_s);
+                    value["bytes"] = json!(m.bytes);
+                    value["errors"] = json!(e);
+                    value["penetration_m"] = json!(m.penetration);
+                    value["certificate"] = json!(m.certificate);
+                }
+                Err(why) => value["status"] = json!(format!("not run: {why}")),
+            }
+            value
+        })
+        .collect();
+    let mut text = serde_json::to_string_pretty(&json!({
+        "title": study.title,
+        "sentence": study.sentence(),
+        "machine": study.machine,
+        "reference": {
+            "made": study.reference.made,
+            "bar": study.reference.bar,
+            "bar_made": study.reference.bar_made,
+            "peak_force_N": study.peak.0,
+            "travel_at_peak_m": study.peak.1,
+        },
+        "rows": rows,
+    }))
+    .unwrap_or_default();
+    text.push('\n');
+    text
+}
+
+const HEAD: &str = "<tr><th>setting</th><th>step, 50 % (µs)</th><th>step, 99.9 % (µs)</th>\
+    <th>shape (µs)</th><th>preparing</th><th>memory</th><th>wrench</th><th>peak</th>\
+    <th>shift of the peak (mm)</th><th>shape</th><th>energy</th><th>depth (µm)</th></tr>";
+
+const HOW_TO_READ: &str = "<ul>\
+<li><b>wrench</b>: distance of force and torque from the reference along the whole path, root of the \
+mean square, as a share of the reference's. <b>peak</b>: of the largest force, with its sign. \
+<b>shape</b>: of the drawn displacement where the part can touch; a dash where the mesh has other \
+nodes. <b>energy</b>: in the energy norm at the reference's highest energy. <b>depth</b>: how deep \
+a node, or a point on an edge between nodes, is inside the tool at most.</li>\
+<li>Errors below the reference's own are no differences.</li>\
+<li>Only steps with contact are counted, the whole step without the drawn shape, which a session \
+makes 60 times a second. No slow step is left out.</li>\
+<li>The orange band is the front: settings that no other beats in both time and error.</li></ul>";
+
+fn page(study: &Study, plots: [&String; 3], curves: &str) -> String {
+    let mut page = String::new();
+    let title = escaped(&study.title);
+    page.push_str("<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n");
+    page.push_str("<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n");
+    let _ = writeln!(page, "<title>{title}: accuracy and time</title>");
+    let _ = writeln!(page, "<style>{STYLE}</style></head><body><main>");
+    let _ = writeln!(page, "<h1>{title}: what accuracy costs in time</h1>");
+    let _ = writeln!(
+        page,
+        "<p class=\"where\">{}</p>",
+        escaped(&study.scene_path)
+    );
+    let _ = writeln!(
+        page,
+        "<p class=\"headline\">{}</p>",
+        escaped(&study.sentence())
+    );
+    let _ = writeln!(
+        page,
+        "<p>Reference: {}; its peak is {} N at {} mm of the handle's travel. Its own error is {}: {}. The \
+         scene's own settings: {}.</p>",
+        escaped(&study.reference.made),
+        short(study.peak.0),
+        short(1e3 * study.peak.1),
+        study.reference.bar.map_or("unknown".to_owned(), percent),
+        escaped(&study.reference.bar_made),
+        escaped(&study.own),
+    );
+    let figure = |page: &mut String, svg: &str, caption: &str| {
+        let _ = writeln!(
+            page,
+            "<figure>{svg}<figcaption>{}</figcaption></figure>",
+            escaped(caption)
+        );
+    };
+    let _ = writeln!(page, "<h2>Error against time</h2>");
+    figure(
+        &mut page,
+        plots[0],
+        "One line for each choice; each point is the scene's own setting with that one changed.",
+    );
+    let _ = writeln!(page, "<h2>The curves behind it</h2>");
+    figure(
+        &mut page,
+        curves,
+        "Force over the handle's travel at other orders and meshes.",
+    );
+    let _ = writeln!(page, "<h2>Error against memory and preparing</h2>");
+    figure(
+        &mut page,
+        plots[1],
+        "Compliance that the step and the drawn shape read.",
+    );
+    figure(
+        &mut page,
+        plots[2],
+        "Settings that came from the cache are not shown.",
+    );
+    let _ = writeln!(page, "<h2>Tables</h2>");
+    for axis in Axis::ALL {
+        let rows: Vec<&Row> = study.rows.iter().filter(|r| r.axis == axis).collect();
+        if rows.is_empty() {
+            continue;
+        }
+        let _ = writeln!(page, "<h3>{}</h3><table>{HEAD}", escaped(axis.title()));
+        for row in rows {
+            let label = if row.is_own {
+                format!("<b>{}</b> (own)", escaped(&row.label))
+            } else {
+                escaped(&row.label)
+            };
+            match &row.outcome {
+                Ok((measured, errors)) => {
+                    let line: String = table_cells(study, measured, errors);
+                    let _ = writeln!(page, "<tr><td>{label}</td>{line}</tr>");
+                }
+                Err(why) => {
+                    let why = escaped(why);
+                    let _ = writeln!(
+                        page,
+                        "<tr><td>{label}</td><td colspan=\"11\">not run: {why}</td></tr>"
+                    );
+                }
+            }
+        }
+        page.push_str("</table>\n");
+    }
+    let _ = writeln!(page, "<ul>");
+    for (what, why) in NOT_THERE {
+        let _ = writeln!(page, "<li>{what}: no choice, {why}.</li>");
+    }
+    let stages = study.distinct();
+    if let Some((row, measured, _)) = stages.iter().find(|(row, ..)| row.is_own) {
+        let list: Vec<String> = crate::engine::Stage::ALL
+            .iter()
+            .zip(&measured.stages)
+            .map(|(stage, t)| format!("{} {} and {}", stage.name(), short(t.p50), short(t.p999)))
+            .collect();
+        let _ = writeln!(
+            page,
+            "<li>Stages of {} (µs, 50 % and 99.9 %, {} steps): {}; of the others in accuracy.csv.</li>",
+            escaped(&name(row)),
+            measured.n_timed,
+            list.join(", ")
+        );
+    }
+    let _ = writeln!(page, "</ul><h2>How to read this</h2>{HOW_TO_READ}");
+    let _ = writeln!(
+        page,
+        "<footer>Written by snapin {} on {}.</footer></main></body></html>",
+        env!("CARGO_PKG_VERSION"),
+        escaped(&study.machine)
+    );
+    page
+}
+
+/// Cells of a line; the error of the wrench grey where it is below the reference's own.
+fn table_cells(study: &Study, measured: &Measured, errors: &Errors) -> String {
+    let is_below = study
+        .reference
+        .bar
+        .is_some_and(|bar| errors.wrench_l2 < bar);
+    cells(measured, errors)
+        .iter()
+        .enumerate()
+        .map(|(k, cell)| {
+            let grey = if k == 5 && is_below {
+                " style=\"color:#888\""
+            } else {
+                ""
+            };
+            format!("<td{grey}>{}</td>", escaped(cell))
+        })
+        .collect()
+}

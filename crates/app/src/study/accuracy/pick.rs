@@ -1,0 +1,200 @@
+//! `accuracy = { budget_us = ... }`: the most accurate settings whose steps keep a budget here.
+
+use super::compare::{Scales, distance};
+use super::measure::{Course, Samples, measure, ready};
+use super::point::{Setting, base, set_accuracy};
+use crate::Error;
+use crate::prepare::PrepareOptions;
+use crate::progress::Ui;
+use crate::report::plot::short;
+use crate::scene::{Accuracy, ContactIterations, Preset, Scene};
+use crate::session::part_extent;
+
+/// s of timed steps for each rung: some ten thousand steps on a small part.
+const TIMED_S: f64 = 0.3;
+
+/// A rung of the ladder as measured.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Rung {
+    /// In words.
+    pub name: String,
+    /// 99.9 % of the steps are faster, µs.
+    pub p999_us: f64,
+    /// Error of the wrench against the top rung.
+    pub error: f64,
+}
+
+/// What was chosen, and why not the next better one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picked {
+    /// Position on the ladder.
+    pub rung: usize,
+    /// One line for the user.
+    pub why: String,
+}
+
+/// The scene with its budget made into settings; as it is if it has none. The line says what was
+/// picked.
+///
+/// # Errors
+/// A budget that no setting keeps, naming the nearest; as preparing; Ctrl-C.
+pub fn resolved(
+    scene: Scene,
+    options: &PrepareOptions,
+    ui: &Ui<'_>,
+) -> Result<(Scene, Option<String>), Error> {
+    let Some(budget) = scene.accuracy.budget_us else {
+        return Ok((scene, None));
+    };
+    let ladder = ladder(&scene);
+    let course = Course::of(&scene);
+    let (mut rungs, mut paths) = (Vec::new(), Vec::new());
+    let (mut samples, mut lever) = (None, 1.0);
+    let mut kept = Vec::new();
+    for (name, setting) in ladder {
+        ui.status(&format!("accuracy.budget_us: measuring {name}"));
+        let mut ready = match ready(&setting, options, ui) {
+            Ok(ready) => ready,
+            Err(e) if e.is_interrupt() => return Err(e),
+            // An order that this mesh cannot have is no choice; the lowest one tells what is wrong.
+            Err(e) if setting.scene.part.order == Some(1) => return Err(e),
+            Err(_) => continue,
+        };
+        lever = part_extent(&ready.prepared.loaded.mesh);
+        let samples = samples.get_or_insert_with(|| Samples::of(&ready.prepared));
+        let found = measure(&mut ready, &setting.scene, &course, samples, Some(TIMED_S))?;
+        rungs.push(Rung {
+            name,
+            p999_us: found.step.p999,
+            error: 0.0,
+        });
+        paths.push(found.wrench);
+        kept.push(setting);
+    }
+    ui.end_status();
+    let scales = Scales {
+        direction: scene.hand.direction.to_array(),
+        lever,
+        travel: scene.hand.travel,
+    };
+    for (rung, path) in rungs.iter_mut().zip(&paths) {
+        rung.error = distance(path, &paths[0], &scales);
+    }
+    let picked = pick(&rungs, budget)
+        .map_err(|why| Error::Input(format!("{}: {why}", scene.path.display())))?;
+    let mut scene = kept[picked.rung].scene.clone();
+    scene.accuracy.budget_us = None;
+    Ok((scene, Some(picked.why)))
+}
+
+/// From the most accurate to the fastest.
+fn ladder(scene: &Scene) -> Vec<(String, Setting)> {
+    let mut rungs = Vec::new();
+    for order in [3u8, 2, 1] {
+        for times in [None, Some(3), Some(2), Some(1)] {
+            let mut setting = base(scene);
+            setting.scene.accuracy.budget_us = None;
+            let preset = if order == 3 {
+                Some(Preset::Exact)
+            } else {
+                None
+            };
+            set_accuracy(&mut setting.scene, Accuracy::of(preset));
+            setting.scene.accuracy.preset = None;
+            setting.scene.part.order = Some(order);
+            let planes = match times {
+                None => "planes converged".to_owned(),
+                Some(1) => "1 pass".to_owned(),
+                Some(n) => format!("{n} passes"),
+            };
+            if let Some(n) = times {
+                setting.scene.accuracy.contact_iterations = ContactIterations::Times(n);
+            }
+            rungs.push((format!("order {order}, {planes}"), setting));
+        }
+    }
+    rungs
+}
+
+/// The rung with the least error that keeps the budget.
+fn pick(rungs: &[Rung], budget_us: f64) -> Result<Picked, String> {
+    let keeps = |rung: &Rung| rung.p999_us <= budget_us;
+    let by_error = |a: &&usize, b: &&usize| rungs[**a].error.total_cmp(&rungs[**b].error);
+    let all: Vec<usize> = (0..rungs.len()).collect();
+    let best = all.iter().filter(|k| keeps(&rungs[**k])).min_by(by_error);
+    let Some(&best) = best else {
+        let nearest = rungs.iter().min_by(|a, b| a.p999_us.total_cmp(&b.p999_us));
+        return Err(match nearest {
+            Some(rung) => format!(
+                "no setting keeps accuracy.budget_us = {budget_us}: the nearest is {}, 99.9 % of whose \
+                 steps take less than {} us here; allow {} or more",
+                rung.name,
+                short(rung.p999_us),
+                (1.2 * rung.p999_us).ceil()
+            ),
+            None => "no setting could be measured".to_owned(),
+        });
+    };
+    let rung = &rungs[best];
+    let better = all
+        .iter()
+        .filter(|k| !keeps(&rungs[**k]) && rungs[**k].error < rung.error)
+        .max_by(by_error);
+    let next = better.map_or(String::new(), |k| {
+        let (name, p999) = (&rungs[*k].name, short(rungs[*k].p999_us));
+        format!("; {name}, the next more accurate, needs {p999} us")
+    });
+    Ok(Picked {
+        rung: best,
+        why: format!(
+            "accuracy.budget_us = {budget_us}: picked {}, 99.9 % of whose steps take less than {} us here, {} % \
+             from {}{next}",
+            rung.name,
+            short(rung.p999_us),
+            short(100.0 * rung.error),
+            rungs[0].name
+        ),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rungs() -> Vec<Rung> {
+        [
+            ("order 3", 300.0, 0.0),
+            ("order 2", 120.0, 0.05),
+            ("order 2, 1 pass", 40.0, 0.2),
+            ("order 1", 30.0, 3.0),
+        ]
+        .map(|(name, p999_us, error)| Rung {
+            name: name.to_owned(),
+            p999_us,
+            error,
+        })
+        .to_vec()
+    }
+
+    #[test]
+    fn the_most_accurate_that_keeps_the_budget_is_picked_and_the_next_is_named() {
+        let picked = pick(&rungs(), 200.0).unwrap();
+        assert_eq!(picked.rung, 1);
+        assert_eq!(
+            picked.why,
+            "accuracy.budget_us = 200: picked order 2, 99.9 % of whose steps take less than 120 us \
+             here, 5 % from order 3; order 3, the next more accurate, needs 300 us"
+        );
+        assert_eq!(pick(&rungs(), 1000.0).unwrap().rung, 0);
+        assert_eq!(pick(&rungs(), 35.0).unwrap().rung, 3);
+    }
+
+    #[test]
+    fn a_budget_that_nothing_keeps_names_the_nearest() {
+        assert_eq!(
+            pick(&rungs(), 10.0).unwrap_err(),
+            "no setting keeps accuracy.budget_us = 10: the nearest is order 1, 99.9 % of whose steps take \
+             less than 30 us here; allow 36 or more"
+        );
+    }
+}

@@ -1,0 +1,292 @@
+//! The settings that are compared: the scene's own, with one of them changed at a time.
+
+use std::path::Path;
+
+use crate::scene::{
+    Accuracy, Adaptive, ContactIterations, FreeNodes, PMethod, Preset, QuadratureRule, Scalar,
+    Scene,
+};
+
+/// What is changed along a line of the plots.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Axis {
+    /// Order of the elements.
+    Order,
+    /// Mesh of the scene, others, and the scene's refined.
+    Mesh,
+    /// Passes over the contact planes.
+    Planes,
+    /// Which interface nodes are free, forces of the full order.
+    Select,
+    /// Which interface nodes are free, by Galerkin.
+    Constrain,
+    /// Tolerance of the complementarity problem.
+    LcpTolerance,
+    /// Planes kept in a step.
+    MaxContacts,
+    /// Number type of the drawn shape.
+    Scalar,
+    /// Rule for the element integrals.
+    Quadrature,
+    /// Settings for a goal.
+    Preset,
+}
+
+impl Axis {
+    /// All, in the order of the tables.
+    pub const ALL: [Self; 10] = [
+        Self::Order,
+        Self::Mesh,
+        Self::Planes,
+        Self::Select,
+        Self::Constrain,
+        Self::LcpTolerance,
+        Self::MaxContacts,
+        Self::Scalar,
+        Self::Quadrature,
+        Self::Preset,
+    ];
+
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Order => "order",
+            Self::Mesh => "mesh",
+            Self::Planes => "planes",
+            Self::Select => "select",
+            Self::Constrain => "constrain",
+            Self::LcpTolerance => "lcp",
+            Self::MaxContacts => "contacts",
+            Self::Scalar => "scalar",
+            Self::Quadrature => "quadrature",
+            Self::Preset => "preset",
+        }
+    }
+
+    /// What it is, for tables.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Order => "order of the elements",
+            Self::Mesh => "mesh",
+            Self::Planes => "passes over the contact planes",
+            Self::Select => "p-method: select (free nodes drawn)",
+            Self::Constrain => "p-method: constrain (free nodes solved)",
+            Self::LcpTolerance => "LCP tolerance",
+            Self::MaxContacts => "contacts kept",
+            Self::Scalar => "numbers of the drawn shape",
+            Self::Quadrature => "quadrature",
+            Self::Preset => "preset",
+        }
+    }
+
+    /// The axis of this name.
+    pub fn of_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|axis| axis.name() == name)
+    }
+}
+
+/// A choice that this build or this scene does not have, with the reason.
+pub const NOT_THERE: [(&str, &str); 2] = [
+    ("multiply on the GPU", "this build has the processor's only"),
+    (
+        "two rates",
+        "this build solves the whole step in the haptic loop",
+    ),
+];
+
+/// One setting.
+#[derive(Clone, Debug)]
+pub struct Setting {
+    /// The scene with its settings changed.
+    pub scene: Scene,
+    /// How often its mesh is refined.
+    pub refinements: u8,
+}
+
+impl Setting {
+    /// All that the result depends on beside the scene itself; equal keys are one run.
+    pub fn key(&self) -> String {
+        let accuracy = Accuracy {
+            preset: None,
+            budget_us: None,
+            ..self.scene.accuracy.clone()
+        };
+        format!(
+            "{} refined {} order {:?} {:?} {accuracy:?}",
+            self.scene.part.mesh.display(),
+            self.refinements,
+            self.scene.part.order,
+            self.scene.part.quadrature,
+        )
+    }
+}
+
+/// A setting on an axis.
+#[derive(Clone, Debug)]
+pub struct Point {
+    /// Which setting was changed.
+    pub axis: Axis,
+    /// To what.
+    pub label: String,
+    /// The whole.
+    pub setting: Setting,
+}
+
+/// The scene's own settings.
+pub(super) fn base(scene: &Scene) -> Setting {
+    Setting {
+        scene: scene.clone(),
+        refinements: 0,
+    }
+}
+
+/// All points of the axes asked for. `own_order`: that of the mesh; `extent`: size of the part, m.
+pub(super) fn points(scene: &Scene, axes: &[Axis], own_order: u8, extent: f64) -> Vec<Point> {
+    let mut all = Vec::new();
+    let own = scene.part.order.unwrap_or(own_order);
+    for &axis in axes {
+        let mut add = |label: String, change: &dyn Fn(&mut Setting)| {
+            let mut setting = base(scene);
+            setting.scene.accuracy.preset = None;
+            change(&mut setting);
+            all.push(Point {
+                axis,
+                label,
+                setting,
+            });
+        };
+        match axis {
+            Axis::Order => {
+                for order in 1..=3u8 {
+                    add(format!("order {order}"), &|s| {
+                        s.scene.part.order = Some(order);
+                    });
+                }
+            }
+            Axis::Mesh => {
+                add(name_of(&scene.part.mesh), &|_| {});
+                for mesh in &scene.part.other_meshes {
+                    add(name_of(mesh), &|s| s.scene.part.mesh.clone_from(mesh));
+                }
+                add("each element in eight".to_owned(), &|s| s.refinements = 1);
+            }
+            Axis::Planes => {
+                for times in [1, 2, 3, 5] {
+                    add(
+                        format!("{times} passes").replace("1 passes", "1 pass"),
+                        &|s| {
+                            s.scene.accuracy.contact_iterations = ContactIterations::Times(times);
+                        },
+                    );
+                }
+                add("converged".to_owned(), &|s| {
+                    s.scene.accuracy.contact_iterations = ContactIterations::Converged;
+                });
+            }
+            Axis::Select | Axis::Constrain if own == 1 => {}
+            Axis::Select => {
+                let mut free = |label: String, free| {
+                    add(label, &|s| {
+                        s.scene.accuracy.adaptive = Adaptive::On {
+                            method: PMethod::Select,
+                            free,
+                        };
+                    });
+                };
+                free("none free".to_owned(), FreeNodes::Radius(0.0));
+                for share in [0.05, 0.1] {
+                    let radius = rounded(share * extent);
+                    free(
+                        format!("within {} mm", 1e3 * radius),
+                        FreeNodes::Radius(radius),
+                    );
+                }
+                free("where bent by 0.1 %".to_owned(), FreeNodes::Indicator(1e-3));
+                add("all free".to_owned(), &|s| {
+                    s.scene.accuracy.adaptive = Adaptive::Off;
+                });
+            }
+            Axis::Constrain => {
+                for share in [0.0, 0.025, 0.05, 0.1, 0.2] {
+                    let radius = rounded(share * extent);
+                    let label = if share == 0.0 {
+                        "none free".to_owned()
+                    } else {
+                        format!("within {} mm", 1e3 * radius)
+                    };
+                    add(label, &|s| {
+                        s.scene.accuracy.adaptive = Adaptive::On {
+                            method: PMethod::Constrain,
+                            free: FreeNodes::Radius(radius),
+                        };
+                    });
+                }
+                add("all free".to_owned(), &|s| {
+                    s.scene.accuracy.adaptive = Adaptive::Off;
+                });
+            }
+            Axis::LcpTolerance => {
+                for tolerance in [1e-3, 1e-6, 1e-10, 1e-13] {
+                    add(format!("{tolerance:e}"), &|s| {
+                        s.scene.accuracy.lcp_tolerance = tolerance;
+                    });
+                }
+            }
+            Axis::MaxContacts => {
+                for most in [8, 16, 32, 500] {
+                    add(format!("{most} planes"), &|s| {
+                        s.scene.accuracy.max_contacts = most;
+                    });
+                }
+            }
+            Axis::Scalar => {
+                for (label, scalar) in [("f32", Scalar::F32), ("f64", Scalar::F64)] {
+                    add(label.to_owned(), &|s| s.scene.accuracy.scalar = scalar);
+                }
+            }
+            Axis::Quadrature => {
+                for (label, rule) in [
+                    ("fast", QuadratureRule::Fast),
+                    ("converged", QuadratureRule::Converged),
+                ] {
+                    add(label.to_owned(), &|s| s.scene.part.quadrature = rule);
+                }
+            }
+            Axis::Preset => {
+                for preset in [Preset::Fast, Preset::Balanced, Preset::Exact] {
+                    add(preset.name().to_owned(), &|s| {
+                        set_accuracy(&mut s.scene, Accuracy::of(Some(preset)));
+                        if preset == Preset::Exact {
+                            s.scene.part.order = Some(3);
+                        }
+                    });
+                }
+            }
+        }
+    }
+    all
+}
+
+/// Takes settings of accuracy over; what depends on the scene's size stays the scene's.
+pub(super) fn set_accuracy(scene: &mut Scene, accuracy: Accuracy) {
+    scene.accuracy = Accuracy {
+        near_distance: scene.accuracy.near_distance,
+        max_contacts: scene.accuracy.max_contacts,
+        multiply: scene.accuracy.multiply,
+        ..accuracy
+    };
+}
+
+fn name_of(mesh: &Path) -> String {
+    mesh.file_name()
+        .map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+}
+
+/// To two digits: radii that are read easily.
+fn rounded(length: f64) -> f64 {
+    if length == 0.0 {
+        return 0.0;
+    }
+    let unit = 10f64.powf(length.log10().floor() - 1.0);
+    (length / unit).round() * unit
+}

@@ -1,0 +1,213 @@
+//! Finished settings kept in files, so that an interrupted study goes on where it was; and references
+//! in files.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::compare::Reference;
+use super::measure::Measured;
+use super::point::Setting;
+use crate::Error;
+use crate::prepare::load;
+use crate::scene::Scene;
+use crate::setup;
+
+/// Changes when what is stored means something else.
+const FORMAT: u32 = 1;
+
+/// What a scene is, whatever its settings of accuracy: a hash of mesh, material, supports, contact,
+/// tool, path and coupling.
+///
+/// # Errors
+/// A mesh that cannot be read.
+pub(super) fn identity(scene: &Scene) -> Result<String, Error> {
+    let read = |path: &Path| fs::read(path).map_err(Error::io(path, "read"));
+    let mut hash = blake3::Hasher::new();
+    hash.update(&read(&scene.part.mesh)?);
+    if let crate::scene::ToolShape::Mesh { file, .. } = &scene.tool.shape {
+        hash.update(&read(file)?);
+    }
+    let groups: Vec<_> = scene
+        .part
+        .fixed
+        .iter()
+        .map(|f| (&f.group.name, f.components))
+        .collect();
+    let contact: Vec<_> = scene.part.contact.iter().map(|g| &g.name).collect();
+    let material = &scene.part.material;
+    let shape = match &scene.tool.shape {
+        crate::scene::ToolShape::Mesh { scale, .. } => format!("mesh {scale}"),
+        shape => format!("{shape:?}"),
+    };
+    let rest = format!(
+        "{} {groups:?} {contact:?} {} {} {shape} {:?} {:?} {:?} {} {} {} {:?}",
+        scene.length_scale,
+        material.young_modulus,
+        material.poisson_ratio,
+        scene.tool.pose_part_tool,
+        scene.handle,
+        scene.hand.direction,
+        scene.hand.travel,
+        scene.hand.speed,
+        scene.device.servo_period,
+        scene.coupling,
+    );
+    hash.update(rest.as_bytes());
+    Ok(hash.finalize().to_hex()[..32].to_owned())
+}
+
+/// Settings that are done, one file each.
+#[derive(Debug)]
+pub(super) struct Store {
+    folder: PathBuf,
+    scene: String,
+}
+
+/// What a file holds.
+#[derive(Serialize, Deserialize)]
+struct Stored {
+    format: u32,
+    key: String,
+    measured: Measured,
+}
+
+impl Store {
+    pub(super) fn new(folder: &Path, scene: &str) -> Result<Self, Error> {
+        fs::create_dir_all(folder).map_err(Error::io(folder, "create the folder of points"))?;
+        Ok(Self {
+            folder: folder.to_owned(),
+            scene: scene.to_owned(),
+        })
+    }
+
+    fn key(&self, setting: &Setting, timed_s: Option<f64>) -> String {
+        let mesh = fs::read(&setting.scene.part.mesh).unwrap_or_default();
+        format!(
+            "{} {} {} {} {timed_s:?}",
+            self.scene,
+            env!("CARGO_PKG_VERSION"),
+            blake3::hash(&mesh).to_hex(),
+            setting.key()
+        )
+    }
+
+    fn file(&self, key: &str) -> PathBuf {
+        let name = &blake3::hash(key.as_bytes()).to_hex()[..24];
+        self.folder.join(format!("{name}.json"))
+    }
+
+    /// A setting that is done already; a file that is damaged or of another version is not.
+    pub(super) fn find(&self, setting: &Setting, timed_s: Option<f64>) -> Option<Measured> {
+        let key = self.key(setting, timed_s);
+        let text = fs::read_to_string(self.file(&key)).ok()?;
+        let stored: Stored = serde_json::from_str(&text).ok()?;
+        (stored.format == FORMAT && stored.key == key).then_some(stored.measured)
+    }
+
+    /// Keeps a setting, written beside and renamed.
+    pub(super) fn keep(
+        &self,
+        setting: &Setting,
+        timed_s: Option<f64>,
+        measured: &Measured,
+    ) -> Result<(), Error> {
+        let key = self.key(setting, timed_s);
+        let file = self.file(&key);
+        let stored = Stored {
+            format: FORMAT,
+            key,
+            measured: measured.clone(),
+        };
+        write(&file, &serde_json::to_string(&stored).unwrap_or_default())
+    }
+}
+
+/// Writes beside and renames.
+pub(super) fn write(file: &Path, text: &str) -> Result<(), Error> {
+    let beside = file.with_extension("partial");
+    fs::write(&beside, text)
+        .map_err(Error::io(&beside, "write (name another folder with --out)"))?;
+    fs::rename(&beside, file).map_err(Error::io(file, "put in its place"))
+}
+
+/// A reference as a file.
+#[derive(Serialize, Deserialize)]
+struct ReferenceFile {
+    format: u32,
+    scene: String,
+    title: String,
+    reference: Reference,
+}
+
+/// Writes a reference for other runs.
+pub(super) fn save_reference(
+    file: &Path,
+    scene: &Scene,
+    identity: &str,
+    reference: &Reference,
+) -> Result<(), Error> {
+    let content = ReferenceFile {
+        format: FORMAT,
+        scene: identity.to_owned(),
+        title: scene.title.clone(),
+        reference: reference.clone(),
+    };
+    write(file, &serde_json::to_string(&content).unwrap_or_default())
+}
+
+/// Reads a reference of this scene.
+///
+/// # Errors
+/// A file that cannot be read, is none, or belongs to another scene.
+pub(super) fn read_reference(
+    file: &Path,
+    scene: &Scene,
+    identity: &str,
+    n_steps: usize,
+) -> Result<Reference, Error> {
+    let text = fs::read_to_string(file).map_err(Error::io(file, "read the reference"))?;
+    let refuse = |what: String| Error::Input(format!("{}: {what}", file.display()));
+    let content: ReferenceFile = serde_json::from_str(&text).map_err(|e| {
+        refuse(format!(
+            "is no reference of `snapin accuracy` ({e}); write one with --save-reference"
+        ))
+    })?;
+    if content.format != FORMAT {
+        return Err(refuse(format!(
+            "has format {}, this version reads {FORMAT}; write it anew with --save-reference",
+            content.format
+        )));
+    }
+    if content.scene != identity {
+        return Err(refuse(format!(
+            "is the reference of another scene ({:?}, this one is {:?}): mesh, material, supports, tool, \
+             path or coupling differ; write one for this scene with --save-reference",
+            content.title, scene.title
+        )));
+    }
+    let reference = content.reference;
+    let is_whole = reference.wrench.len() == n_steps
+        && reference.potential.len() == n_steps
+        && reference
+            .wrench
+            .iter()
+            .flatten()
+            .chain(&reference.potential)
+            .all(|x| x.is_finite());
+    if !is_whole {
+        return Err(refuse(format!(
+            "should hold {n_steps} finite wrenches and energies; write it anew with --save-reference"
+        )));
+    }
+    Ok(reference)
+}
+
+/// Order of the elements in the mesh file.
+pub(super) fn own_order(scene: &Scene) -> Result<u8, Error> {
+    let mut spec = setup::part_spec(scene)?;
+    spec.order = None;
+    spec.bubbles = None;
+    Ok(load(&spec)?.mesh.order as u8)
+}

@@ -1,0 +1,254 @@
+//! The study as text and CSV.
+
+use std::fmt::Write as _;
+
+use super::compare::pareto_front;
+use super::{Axis, Errors, Measured, NOT_THERE, Row, Study};
+use crate::engine::Stage;
+use crate::prepare::budget::{bytes, duration};
+use crate::report::plot::short;
+
+/// µs: the period of a haptic loop.
+pub(super) const PERIOD_US: f64 = 1000.0;
+
+impl Study {
+    /// The settings that ran, each once.
+    pub(super) fn distinct(&self) -> Vec<(&Row, &Measured, &Errors)> {
+        let mut all: Vec<(&Row, &Measured, &Errors)> = Vec::new();
+        for row in &self.rows {
+            if let Ok((measured, errors)) = &row.outcome
+                && !(row.is_own && all.iter().any(|(other, ..)| other.is_own))
+            {
+                all.push((row, measured, errors));
+            }
+        }
+        all
+    }
+
+    /// One sentence: the best setting under 1 ms, and what it gives up.
+    pub fn sentence(&self) -> String {
+        let all = self.distinct();
+        let fits = |m: &Measured| m.step.p999 < PERIOD_US;
+        let by_error = |a: &&(&Row, &Measured, &Errors), b: &&(&Row, &Measured, &Errors)| {
+            // Equal errors: the faster one.
+            let same = (a.2.wrench_l2 - b.2.wrench_l2).abs() <= 1e-6;
+            let by_error = a.2.wrench_l2.total_cmp(&b.2.wrench_l2);
+            let by_time = a.1.step.p50.total_cmp(&b.1.step.p50);
+            if same { by_time } else { by_error }
+        };
+        let best = all.iter().filter(|(_, m, _)| fits(m)).min_by(by_error);
+        let Some((row, measured, errors)) = best else {
+            let fastest = all
+                .iter()
+                .min_by(|a, b| a.1.step.p999.total_cmp(&b.1.step.p999));
+            return fastest.map_or("No setting could be run.".to_owned(), |(row, m, _)| {
+                format!(
+                    "No setting keeps 99.9 % of its steps under 1 ms here; {} comes nearest with {} µs.",
+                    name(row),
+                    short(m.step.p999)
+                )
+            });
+        };
+        let better = all
+            .iter()
+            .filter(|(_, m, e)| !fits(m) && e.wrench_l2 < errors.wrench_l2)
+            .min_by(by_error);
+        let gives_up = match better {
+            Some((other, m, e)) => format!(
+                "; {} would be within {} but needs {} µs",
+                name(other),
+                percent(e.wrench_l2),
+                short(m.step.p999)
+            ),
+            None => "; nothing that was measured is more accurate".to_owned(),
+        };
+        let bar = match self.reference.bar {
+            Some(bar) if errors.wrench_l2 <= bar => format!(
+                ", less than the {} by which the reference itself may be wrong",
+                percent(bar)
+            ),
+            Some(bar) => format!(" (itself known to {})", percent(bar)),
+            None => String::new(),
+        };
+        format!(
+            "Under 1 ms the best setting here is {}: 99.9 % of its steps take less than {} µs, and it gives \
+             up {} of the force along the path against the reference{bar}, {} at the peak{gives_up}.",
+            name(row),
+            short(measured.step.p999),
+            percent(errors.wrench_l2),
+            percent(errors.peak.abs()),
+        )
+    }
+}
+
+/// A setting in words.
+pub(super) fn name(row: &Row) -> String {
+    if row.is_own {
+        "the scene's own".to_owned()
+    } else {
+        format!("{} {}", row.axis.name(), row.label)
+            .replace("order order", "order")
+            .replace("planes planes", "planes")
+    }
+}
+
+pub(super) fn percent(share: f64) -> String {
+    format!("{} %", short(100.0 * share))
+}
+
+const COLUMNS: [&str; 11] = [
+    "p50 us", "p99.9 us", "shape us", "prepare", "memory", "wrench", "peak", "shift mm", "shape",
+    "energy", "depth um",
+];
+
+/// Cells of a line: times, costs, errors.
+pub(super) fn cells(measured: &Measured, errors: &Errors) -> [String; 11] {
+    [
+        short(measured.step.p50),
+        short(measured.step.p999),
+        short(measured.shape.p50),
+        measured.prepare_s.map_or("cached".to_owned(), duration),
+        bytes(measured.bytes),
+        percent(errors.wrench_l2),
+        percent(errors.peak),
+        short(1e3 * errors.peak_travel),
+        errors.displacement.map_or("-".to_owned(), percent),
+        percent(errors.energy),
+        short(1e6 * measured.penetration),
+    ]
+}
+
+/// The tables for a terminal.
+pub fn text(study: &Study) -> String {
+    let mut out = format!("{}\n{}\n", study.title, study.machine);
+    let _ = writeln!(out, "own settings: {}", study.own);
+    let _ = writeln!(out, "reference: {}", study.reference.made);
+    let _ = writeln!(
+        out,
+        "its own error: {} ({})",
+        study.reference.bar.map_or("-".to_owned(), percent),
+        study.reference.bar_made
+    );
+    let _ = writeln!(
+        out,
+        "its peak: {} N at {} mm\n",
+        short(study.peak.0),
+        short(1e3 * study.peak.1)
+    );
+    let _ = write!(out, "{:<28}", "");
+    for column in COLUMNS {
+        let _ = write!(out, "{column:>10}");
+    }
+    out.push('\n');
+    for axis in Axis::ALL {
+        let rows: Vec<&Row> = study.rows.iter().filter(|r| r.axis == axis).collect();
+        if rows.is_empty() {
+            continue;
+        }
+        let _ = writeln!(out, "{}", axis.title());
+        for row in rows {
+            let mark = if row.is_own { "*" } else { "" };
+            let _ = write!(out, "  {:<26}", format!("{}{mark}", row.label));
+            match &row.outcome {
+                Ok((measured, errors)) => {
+                    for cell in cells(measured, errors) {
+                        let _ = write!(out, "{cell:>10}");
+                    }
+                }
+                Err(why) => {
+                    let _ = write!(out, "not run: {why}");
+                }
+            }
+            out.push('\n');
+        }
+    }
+    for (what, why) in NOT_THERE {
+        let _ = writeln!(out, "{what}: no choice, {why}");
+    }
+    let _ = writeln!(out, "* the scene's own setting\n\n{}", study.sentence());
+    out
+}
+
+/// `accuracy.csv`: a line for each point, SI but for times.
+pub(super) fn csv(study: &Study) -> String {
+    let mut out = "axis,setting,own,status,nodes,elements,order,free_nodes,contacts,timed_steps,\
+        step_p50_us,step_p99_us,step_p999_us,step_max_us,shape_p50_us,shape_p999_us"
+        .to_owned();
+    for stage in Stage::ALL {
+        let name = stage.name();
+        let _ = write!(out, ",{name}_p50_us,{name}_p999_us");
+    }
+    out.push_str(
+        ",prepare_s,bytes,wrench_l2_rel,wrench_max_rel,peak_rel,peak_travel_m,displacement_rel,\
+         energy_rel,penetration_m,certificate,switch_change_N,steps_not_converged,front\n",
+    );
+    let all = study.distinct();
+    let costs: Vec<(f64, f64)> = all
+        .iter()
+        .map(|(_, m, e)| (m.step.p999, e.wrench_l2))
+        .collect();
+    let front: Vec<&Row> = pareto_front(&costs).into_iter().map(|k| all[k].0).collect();
+    for row in &study.rows {
+        let _ = write!(
+            out,
+            "{},{},{}",
+            row.axis.name(),
+            quoted(&row.label),
+            row.is_own
+        );
+        match &row.outcome {
+            Err(why) => {
+                let _ = writeln!(out, ",{}", quoted(&format!("not run: {why}")));
+            }
+            Ok((m, e)) => {
+                let _ = write!(
+                    out,
+                    ",ok,{},{},{},{},{},{},{},{},{},{},{},{}",
+                    m.nodes,
+                    m.elements,
+                    m.order,
+                    m.free_nodes,
+                    m.contacts,
+                    m.n_timed,
+                    m.step.p50,
+                    m.step.p99,
+                    m.step.p999,
+                    m.step.max,
+                    m.shape.p50,
+                    m.shape.p999
+                );
+                for stage in &m.stages {
+                    let _ = write!(out, ",{},{}", stage.p50, stage.p999);
+                }
+                let optional = |x: Option<f64>| x.map_or(String::new(), |x| x.to_string());
+                let is_front = front.iter().any(|r| std::ptr::eq(*r, row));
+                let _ = writeln!(
+                    out,
+                    ",{},{},{},{},{},{},{},{},{},{},{},{},{is_front}",
+                    optional(m.prepare_s),
+                    m.bytes,
+                    e.wrench_l2,
+                    e.wrench_max,
+                    e.peak,
+                    e.peak_travel,
+                    optional(e.displacement),
+                    e.energy,
+                    m.penetration,
+                    m.certificate,
+                    m.switch_change,
+                    m.not_converged
+                );
+            }
+        }
+    }
+    out
+}
+
+/// A field that may hold commas.
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n']) {
+        format!("\"{}\"", text.replace('"', "\"\"").replace('\n', " "))
+    } else {
+        text.to_owned()
+    }
+}

@@ -287,8 +287,9 @@ pub(super) fn draw(
     {
         let root = SVGBackend::with_string(&mut svg, fine).into_drawing_area();
         root.fill(&WHITE)?;
-        let (head, body) = root.split_vertically(34 * FINE);
-        legend(&head, keys)?;
+        let lines = legend_lines(&root, keys)?;
+        let (head, body) = root.split_vertically((10 + 24 * lines.len().max(1) as i32) * FINE);
+        legend(&head, &lines)?;
         content(&body)?;
         root.present().map_err(|e| e.to_string())?;
     }
@@ -300,28 +301,54 @@ pub(super) fn draw(
 /// Letters of a legend's entry that fit beside the others.
 const LEGEND_LENGTH: usize = 70;
 
-fn legend(head: &Area<'_>, keys: &[Key]) -> Result<(), Box<dyn Error>> {
-    let (mut x, y) = (84 * FINE, 20 * FINE);
+/// A key, its label cut to what fits, and the label's size.
+type LegendEntry<'a> = (&'a Key, String, (i32, i32));
+
+/// The keys in as many lines as they need.
+fn legend_lines<'a>(
+    area: &Area<'_>,
+    keys: &'a [Key],
+) -> Result<Vec<Vec<LegendEntry<'a>>>, Box<dyn Error>> {
+    let mut lines: Vec<Vec<LegendEntry<'a>>> = Vec::new();
+    let mut x = i32::MAX;
     for key in keys {
-        let line = |from: i32, to: i32| {
-            let ends = [(x + from * FINE, y), (x + to * FINE, y)];
-            head.draw(&PathElement::new(ends, key.style()))
-        };
-        if key.is_dashed {
-            line(0, 10)?;
-            line(15, 25)?;
-        } else {
-            line(0, 25)?;
-        }
-        let style = words(17, INK);
         let mut label: String = key.label.chars().take(LEGEND_LENGTH).collect();
         if label.len() < key.label.len() {
             label.push('…');
         }
-        let (width, height) = head.estimate_text_size(&label, &style)?;
-        let place = (x + 33 * FINE, y - height as i32 / 2);
-        head.draw(&Text::new(label, place, style))?;
-        x += 33 * FINE + width as i32 + 22 * FINE;
+        let (width, height) = area.estimate_text_size(&label, &words(17, INK))?;
+        let size = (width as i32, height as i32);
+        let needed = 55 * FINE + size.0;
+        if x.saturating_add(needed) > (SIZE.0 - 12) * FINE {
+            lines.push(Vec::new());
+            x = 84 * FINE;
+        }
+        x += needed;
+        if let Some(line) = lines.last_mut() {
+            line.push((key, label, size));
+        }
+    }
+    Ok(lines)
+}
+
+fn legend(head: &Area<'_>, lines: &[Vec<LegendEntry<'_>>]) -> Result<(), Box<dyn Error>> {
+    for (entries, k) in lines.iter().zip(0..) {
+        let (mut x, y) = (84 * FINE, (20 + 24 * k) * FINE);
+        for (key, label, (width, height)) in entries {
+            let line = |from: i32, to: i32| {
+                let ends = [(x + from * FINE, y), (x + to * FINE, y)];
+                head.draw(&PathElement::new(ends, key.style()))
+            };
+            if key.is_dashed {
+                line(0, 10)?;
+                line(15, 25)?;
+            } else {
+                line(0, 25)?;
+            }
+            let place = (x + 33 * FINE, y - height / 2);
+            head.draw(&Text::new(label.clone(), place, words(17, INK)))?;
+            x += 55 * FINE + width;
+        }
     }
     Ok(())
 }

@@ -29,14 +29,16 @@ pub struct PlotPoint {
 pub struct Scale {
     /// Words below the horizontal axis, with the unit.
     pub cost: String,
+    /// Words beside the vertical axis.
+    pub error: String,
     /// A vertical line with its words: 1 ms.
     pub limit: Option<(f64, &'static str)>,
     /// The reference's own error: below it, differences mean nothing.
     pub bar: Option<f64>,
 }
 
-/// Colours of the lines; a tenth line begins again.
-const COLOURS: [RGBColor; 8] = [
+/// Colours of the lines; an eleventh line begins again.
+const COLOURS: [RGBColor; 10] = [
     BLUE,
     VERMILLION,
     GREEN,
@@ -45,6 +47,8 @@ const COLOURS: [RGBColor; 8] = [
     SKY,
     INK,
     RGBColor(150, 110, 60),
+    RGBColor(130, 130, 130),
+    RGBColor(0, 95, 75),
 ];
 
 /// Forces that people tell apart differ by 7 to 10 %; 5 % is the aim.
@@ -85,7 +89,7 @@ pub fn error_over_cost(
         chart
             .configure_mesh()
             .x_desc(&scale.cost)
-            .y_desc("error of the wrench along the path")
+            .y_desc(&scale.error)
             .label_style(words(17, INK))
             .axis_desc_style(words(18, INK))
             .axis_style(GREY.stroke_width(FINE as u32))
@@ -93,7 +97,10 @@ pub fn error_over_cost(
             .light_line_style(TRANSPARENT)
             .set_all_tick_mark_size(5 * FINE)
             .x_label_formatter(&|x| short(*x))
-            .y_label_formatter(&|y| format!("{} %", short(100.0 * y)))
+            .y_label_formatter(&|y| match 100.0 * y {
+                y if y < 1e-3 => format!("{y:.0e} %"),
+                y => format!("{} %", short(y)),
+            })
             .draw()?;
         let note = |x: f64, y: f64, text: &str, shift: (i32, i32)| {
             let shift = (shift.0 * FINE, shift.1 * FINE);
@@ -157,7 +164,10 @@ pub fn error_over_cost(
                 let (x, y) = (at.0 + dx, at.1 + dy);
                 taken.push([x, y, x + width, y + height]);
                 let text = Text::new(p.label.clone(), (dx, dy), style);
-                chart.draw_series([EmptyElement::at((p.cost[1], p.error)) + text])?;
+                // The words stay readable where a line runs below them.
+                let corners = [(dx, dy), (dx + width, dy + height)];
+                let backdrop = Rectangle::new(corners, WHITE.mix(0.8).filled());
+                chart.draw_series([EmptyElement::at((p.cost[1], p.error)) + backdrop + text])?;
             }
         }
         Ok(())
@@ -239,6 +249,7 @@ mod tests {
         ];
         let scale = Scale {
             cost: "step (µs)".to_owned(),
+            error: "error".to_owned(),
             limit: Some((1000.0, "1 ms")),
             bar: Some(0.03),
         };

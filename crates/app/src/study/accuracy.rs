@@ -37,6 +37,12 @@ use store::Store;
 /// Seconds that preparing the reference may take by its forecast.
 const REFERENCE_S: f64 = 120.0;
 
+/// Curves that peak at more than this multiple of the reference would hide the others.
+const OFF_SCALE: f64 = 2.0;
+
+/// Planes of the exact solution: enough for any part that is touched at nodes.
+const MOST_CONTACTS: usize = 500;
+
 /// What is asked for.
 #[derive(Clone, Debug)]
 pub struct StudyOptions {
@@ -86,6 +92,8 @@ pub struct Study {
     pub peak: (f64, f64),
     /// Curves of force (N) over travel (m) for the plot, the reference first.
     pub curves: Vec<(String, Vec<(f64, f64)>)>,
+    /// Settings whose curve is beyond that plot, with their peaks (N).
+    pub off_scale: Vec<(String, f64)>,
     /// Settings that were finished before.
     pub n_resumed: usize,
 }
@@ -127,6 +135,7 @@ pub fn run(
         prepare,
         ui,
         done: HashMap::new(),
+        prepare_s: HashMap::new(),
         n_resumed: 0,
     };
     let own = point::base(scene);
@@ -159,9 +168,9 @@ pub fn run(
             begun,
             &format!("{} {}", point.axis.name(), point.label),
         );
-        let outcome = match runner.run(&point.setting) {
-            Ok(measured) => {
-                let errors = errors(&measured, &reference, &scales);
+        let outcome = match runner.run_beside_exact(&point.setting) {
+            Ok((measured, exact)) => {
+                let errors = errors(&measured, &exact, &reference, &scales);
                 Ok((measured, errors))
             }
             Err(e) if e.is_interrupt() => return Err(e),
@@ -180,12 +189,16 @@ pub fn run(
         wrenches.iter().enumerate().map(at).collect()
     };
     let mut curves = vec![("reference".to_owned(), curve(&reference.wrench))];
-    for row in rows
-        .iter()
-        .filter(|r| matches!(r.axis, Axis::Order | Axis::Mesh))
-    {
+    let mut off_scale = Vec::new();
+    let is_curve = |r: &&Row| r.axis == Axis::Order || (r.axis == Axis::Mesh && !r.is_own);
+    for row in rows.iter().filter(is_curve) {
         if let Ok((measured, _)) = &row.outcome {
-            curves.push((row.label.clone(), curve(&measured.wrench)));
+            let (peak, _) = scales.peak(&measured.wrench);
+            if peak > OFF_SCALE * scales.peak(&reference.wrench).0 {
+                off_scale.push((row.label.clone(), peak));
+            } else {
+                curves.push((row.label.clone(), curve(&measured.wrench)));
+            }
         }
     }
     Ok(Study {
@@ -197,6 +210,7 @@ pub fn run(
         rows,
         reference,
         curves,
+        off_scale,
         n_resumed: runner.n_resumed,
     })
 }
@@ -210,6 +224,8 @@ struct Runner<'a, 'u> {
     prepare: &'a PrepareOptions,
     ui: &'a Ui<'u>,
     done: HashMap<String, Result<Measured, String>>,
+    /// s, by part.
+    prepare_s: HashMap<String, f64>,
     n_resumed: usize,
 }
 
@@ -243,6 +259,17 @@ impl Runner<'_, '_> {
         outcome
     }
 
+    /// The setting's result, and the wrenches of the exact solution on its mesh.
+    fn run_beside_exact(&mut self, setting: &Setting) -> Result<(Measured, Vec<[f64; 6]>), Error> {
+        let measured = self.run(setting)?;
+        let mut exact = setting.clone();
+        point::set_accuracy(&mut exact.scene, Accuracy::of(Some(Preset::Exact)));
+        exact.scene.accuracy.preset = None;
+        exact.scene.accuracy.max_contacts = exact.scene.accuracy.max_contacts.max(MOST_CONTACTS);
+        let exact = self.run(&exact)?;
+        Ok((measured, exact.wrench))
+    }
+
     fn run_anew(&mut self, setting: &Setting) -> Result<Measured, Error> {
         // The first setting is the scene's own: its nodes are where displacements are compared.
         let is_first = self.samples.is_none();
@@ -250,7 +277,15 @@ impl Runner<'_, '_> {
             self.n_resumed += 1;
             return Ok(found);
         }
-        let mut ready = measure::ready(setting, self.prepare, self.ui)?;
+        // Preparing is timed once for each part, whatever the cache has.
+        let part = setting.part_key();
+        let options = PrepareOptions {
+            rebuild: !self.prepare_s.contains_key(&part),
+            ..self.prepare.clone()
+        };
+        let mut ready = measure::ready(setting, &options, self.ui)?;
+        let prepare_s = ready.prepared.total_seconds();
+        let prepare_s = *self.prepare_s.entry(part).or_insert(prepare_s);
         let samples = self
             .samples
             .get_or_insert_with(|| Samples::of(&ready.prepared));
@@ -258,13 +293,14 @@ impl Runner<'_, '_> {
             self.n_resumed += 1;
             return Ok(found);
         }
-        let measured = measure::measure(
+        let mut measured = measure::measure(
             &mut ready,
             &setting.scene,
             &self.course,
             samples,
             self.options.timed_s,
         )?;
+        measured.prepare_s = prepare_s;
         self.store.keep(setting, self.options.timed_s, &measured)?;
         Ok(measured)
     }

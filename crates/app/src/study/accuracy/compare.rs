@@ -9,6 +9,9 @@ use super::measure::Measured;
 pub struct Errors {
     /// ‖w - w_ref‖ / ‖w_ref‖ over the path, torques divided by the part's extent.
     pub wrench_l2: f64,
+    /// As `wrench_l2`, against the exact solution on the same mesh at the same order: what solver and
+    /// p-method add to the error of the mesh.
+    pub solver_l2: f64,
     /// Largest difference of the wrench over the largest of the reference.
     pub wrench_max: f64,
     /// (peak - peak_ref) / peak_ref of the force along the approach.
@@ -95,7 +98,13 @@ fn ratio(a: f64, b: f64) -> f64 {
 }
 
 /// Compares along the whole path.
-pub(super) fn errors(measured: &Measured, reference: &Reference, scales: &Scales) -> Errors {
+/// `exact`: the wrenches of the exact solution on the same mesh.
+pub(super) fn errors(
+    measured: &Measured,
+    exact: &[[f64; 6]],
+    reference: &Reference,
+    scales: &Scales,
+) -> Errors {
     let largest = |path: &[[f64; 6]]| path.iter().map(|w| scales.size(w)).fold(0.0, f64::max);
     let difference = differences(&measured.wrench, &reference.wrench);
     let (peak, at) = scales.peak(&measured.wrench);
@@ -109,6 +118,7 @@ pub(super) fn errors(measured: &Measured, reference: &Reference, scales: &Scales
         && measured.displacement.len() == reference.displacement.len();
     Errors {
         wrench_l2: distance(&measured.wrench, &reference.wrench, scales),
+        solver_l2: distance(&measured.wrench, exact, scales),
         wrench_max: ratio(largest(&difference), largest(&reference.wrench)),
         peak: ratio(peak - peak_ref, peak_ref),
         peak_travel: at - at_ref,
@@ -162,7 +172,7 @@ mod tests {
             elements: 2,
             order: 2,
             bytes: 1000.0,
-            prepare_s: Some(0.5),
+            prepare_s: 0.5,
             n_timed: 100,
             step: super::super::measure::Times::default(),
             shape: super::super::measure::Times::default(),
@@ -193,7 +203,7 @@ mod tests {
 
     #[test]
     fn a_tenth_more_force_is_a_tenth_of_error_everywhere() {
-        let errors = errors(&measured(1.1), &reference(), &SCALES);
+        let errors = errors(&measured(1.1), &path(1.1), &reference(), &SCALES);
         for error in [
             errors.wrench_l2,
             errors.wrench_max,
@@ -202,7 +212,7 @@ mod tests {
         ] {
             assert!((error - 0.1).abs() < 1e-12, "{errors:?}");
         }
-        assert_eq!(errors.peak_travel, 0.0);
+        assert_eq!((errors.peak_travel, errors.solver_l2), (0.0, 0.0));
         // Energy a tenth larger: the root of it.
         assert!((errors.energy - 0.1f64.sqrt()).abs() < 1e-12);
         assert_eq!(SCALES.peak(&path(1.0)), (4.0, 0.005));
@@ -212,7 +222,7 @@ mod tests {
     fn a_torque_counts_by_its_lever() {
         let mut turned = measured(1.0);
         turned.wrench[2][5] = 0.05;
-        let errors = errors(&turned, &reference(), &SCALES);
+        let errors = errors(&turned, &path(1.0), &reference(), &SCALES);
         assert!((errors.wrench_max - 0.5 / 4.0).abs() < 1e-12, "{errors:?}");
     }
 
@@ -220,7 +230,10 @@ mod tests {
     fn samples_that_are_not_there_are_not_compared() {
         let mut other = measured(1.0);
         other.displacement.clear();
-        assert_eq!(errors(&other, &reference(), &SCALES).displacement, None);
+        assert_eq!(
+            errors(&other, &path(1.0), &reference(), &SCALES).displacement,
+            None
+        );
     }
 
     #[test]

@@ -192,8 +192,8 @@ pub struct Measured {
     pub order: u8,
     /// Bytes of what the step and the drawn shape read.
     pub bytes: f64,
-    /// s, of preparing; `None` where it came from the cache.
-    pub prepare_s: Option<f64>,
+    /// s, of preparing, the cache aside.
+    pub prepare_s: f64,
     /// Steps with contact that were timed.
     pub n_timed: usize,
     /// Whole step.
@@ -277,7 +277,7 @@ pub(super) fn measure(
         elements: prepared.loaded.mesh.n_elements(),
         order: prepared.loaded.mesh.order as u8,
         bytes: prepared.bytes(),
-        prepare_s: (!prepared.from_cache).then(|| prepared.total_seconds()),
+        prepare_s: prepared.total_seconds(),
         n_timed: 0,
         step: Times::default(),
         shape: Times::default(),

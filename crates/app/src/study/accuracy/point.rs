@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::report::plot::short;
 use crate::scene::{
     Accuracy, Adaptive, ContactIterations, FreeNodes, PMethod, Preset, QuadratureRule, Scalar,
     Scene,
@@ -121,6 +122,27 @@ impl Setting {
     }
 }
 
+impl Setting {
+    /// What its preparing depends on.
+    pub(super) fn part_key(&self) -> String {
+        let part = &self.scene.part;
+        let bubbles = match self.scene.accuracy.adaptive {
+            Adaptive::On {
+                method: PMethod::Constrain,
+                free,
+            } => format!("{free:?}"),
+            _ => String::new(),
+        };
+        format!(
+            "{} refined {} order {:?} {:?} {bubbles}",
+            part.mesh.display(),
+            self.refinements,
+            part.order,
+            part.quadrature
+        )
+    }
+}
+
 /// A setting on an axis.
 #[derive(Clone, Debug)]
 pub struct Point {
@@ -168,7 +190,8 @@ pub(super) fn points(scene: &Scene, axes: &[Axis], own_order: u8, extent: f64) -
                 for mesh in &scene.part.other_meshes {
                     add(name_of(mesh), &|s| s.scene.part.mesh.clone_from(mesh));
                 }
-                add("each element in eight".to_owned(), &|s| s.refinements = 1);
+                let refined = format!("{}, each element in eight", name_of(&scene.part.mesh));
+                add(refined, &|s| s.refinements = 1);
             }
             Axis::Planes => {
                 for times in [1, 2, 3, 5] {
@@ -196,10 +219,7 @@ pub(super) fn points(scene: &Scene, axes: &[Axis], own_order: u8, extent: f64) -
                 free("none free".to_owned(), FreeNodes::Radius(0.0));
                 for share in [0.05, 0.1] {
                     let radius = rounded(share * extent);
-                    free(
-                        format!("within {} mm", 1e3 * radius),
-                        FreeNodes::Radius(radius),
-                    );
+                    free(within(radius), FreeNodes::Radius(radius));
                 }
                 free("where bent by 0.1 %".to_owned(), FreeNodes::Indicator(1e-3));
                 add("all free".to_owned(), &|s| {
@@ -212,7 +232,7 @@ pub(super) fn points(scene: &Scene, axes: &[Axis], own_order: u8, extent: f64) -
                     let label = if share == 0.0 {
                         "none free".to_owned()
                     } else {
-                        format!("within {} mm", 1e3 * radius)
+                        within(radius)
                     };
                     add(label, &|s| {
                         s.scene.accuracy.adaptive = Adaptive::On {
@@ -280,6 +300,10 @@ pub(super) fn set_accuracy(scene: &mut Scene, accuracy: Accuracy) {
 fn name_of(mesh: &Path) -> String {
     mesh.file_name()
         .map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+}
+
+fn within(radius: f64) -> String {
+    format!("within {} mm", short(1e3 * radius))
 }
 
 /// To two digits: radii that are read easily.

@@ -64,7 +64,7 @@ impl Study {
         };
         let bar = match self.reference.bar {
             Some(bar) if errors.wrench_l2 <= bar => format!(
-                ", less than the {} by which the reference itself may be wrong",
+                ", no more than the {} by which the reference itself may be wrong",
                 percent(bar)
             ),
             Some(bar) => format!(" (itself known to {})", percent(bar)),
@@ -93,28 +93,36 @@ pub(super) fn name(row: &Row) -> String {
 }
 
 pub(super) fn percent(share: f64) -> String {
-    format!("{} %", short(100.0 * share))
+    let value = 100.0 * share;
+    if value != 0.0 && value.abs() < 1e-3 {
+        return format!("{value:.0e} %");
+    }
+    format!("{} %", short(value))
 }
 
-const COLUMNS: [&str; 11] = [
-    "p50 us", "p99.9 us", "shape us", "prepare", "memory", "wrench", "peak", "shift mm", "shape",
-    "energy", "depth um",
+const COLUMNS: [&str; 12] = [
+    "p50 us", "p99.9 us", "shape us", "prepare", "memory", "wrench", "solver", "peak", "shift mm",
+    "shape", "energy", "depth um",
 ];
 
 /// Cells of a line: times, costs, errors.
-pub(super) fn cells(measured: &Measured, errors: &Errors) -> [String; 11] {
+pub(super) fn cells(measured: &Measured, errors: &Errors) -> [String; 12] {
     [
         short(measured.step.p50),
         short(measured.step.p999),
         short(measured.shape.p50),
-        measured.prepare_s.map_or("cached".to_owned(), duration),
+        duration(measured.prepare_s),
         bytes(measured.bytes),
         percent(errors.wrench_l2),
+        percent(errors.solver_l2),
         percent(errors.peak),
         short(1e3 * errors.peak_travel),
         errors.displacement.map_or("-".to_owned(), percent),
         percent(errors.energy),
-        short(1e6 * measured.penetration),
+        match 1e6 * measured.penetration {
+            depth if depth < 1e-3 => "below 1e-3".to_owned(),
+            depth => short(depth),
+        },
     ]
 }
 
@@ -135,9 +143,9 @@ pub fn text(study: &Study) -> String {
         short(study.peak.0),
         short(1e3 * study.peak.1)
     );
-    let _ = write!(out, "{:<28}", "");
+    let _ = write!(out, "{:<34}", "");
     for column in COLUMNS {
-        let _ = write!(out, "{column:>10}");
+        let _ = write!(out, "{column:>11}");
     }
     out.push('\n');
     for axis in Axis::ALL {
@@ -148,11 +156,11 @@ pub fn text(study: &Study) -> String {
         let _ = writeln!(out, "{}", axis.title());
         for row in rows {
             let mark = if row.is_own { "*" } else { "" };
-            let _ = write!(out, "  {:<26}", format!("{}{mark}", row.label));
+            let _ = write!(out, "  {:<32}", format!("{}{mark}", row.label));
             match &row.outcome {
                 Ok((measured, errors)) => {
                     for cell in cells(measured, errors) {
-                        let _ = write!(out, "{cell:>10}");
+                        let _ = write!(out, "{cell:>11}");
                     }
                 }
                 Err(why) => {
@@ -179,7 +187,7 @@ pub(super) fn csv(study: &Study) -> String {
         let _ = write!(out, ",{name}_p50_us,{name}_p999_us");
     }
     out.push_str(
-        ",prepare_s,bytes,wrench_l2_rel,wrench_max_rel,peak_rel,peak_travel_m,displacement_rel,\
+        ",prepare_s,bytes,wrench_l2_rel,solver_l2_rel,wrench_max_rel,peak_rel,peak_travel_m,displacement_rel,\
          energy_rel,penetration_m,certificate,switch_change_N,steps_not_converged,front\n",
     );
     let all = study.distinct();
@@ -224,10 +232,11 @@ pub(super) fn csv(study: &Study) -> String {
                 let is_front = front.iter().any(|r| std::ptr::eq(*r, row));
                 let _ = writeln!(
                     out,
-                    ",{},{},{},{},{},{},{},{},{},{},{},{},{is_front}",
-                    optional(m.prepare_s),
+                    ",{},{},{},{},{},{},{},{},{},{},{},{},{},{is_front}",
+                    m.prepare_s,
                     m.bytes,
                     e.wrench_l2,
+                    e.solver_l2,
                     e.wrench_max,
                     e.peak,
                     e.peak_travel,

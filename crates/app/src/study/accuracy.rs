@@ -34,8 +34,9 @@ use compare::{Scales, distance, errors};
 use measure::{Course, Samples};
 use store::Store;
 
-/// Seconds that preparing the reference may take by its forecast.
+/// Seconds that preparing the reference may take by its forecast, and in a quick study.
 const REFERENCE_S: f64 = 120.0;
+const QUICK_REFERENCE_S: f64 = 5.0;
 
 /// Curves that peak at more than this multiple of the reference would hide the others.
 const OFF_SCALE: f64 = 2.0;
@@ -111,6 +112,8 @@ pub fn run(
 ) -> Result<Study, Error> {
     let mut scene = scene.clone();
     scene.accuracy.budget_us = None;
+    let own_order = store::own_order(&scene)?;
+    scene.part.order.get_or_insert(own_order);
     let scene = &scene;
     let identity = store::identity(scene)?;
     let course = Course::of(scene);
@@ -321,10 +324,14 @@ impl Runner<'_, '_> {
             ((2, 1), (2, 0), "each element in eight at order 2"),
             ((3, 0), (2, 0), "the scene's mesh at order 3"),
         ];
+        let limit_s = match self.options.timed_s {
+            Some(_) => QUICK_REFERENCE_S,
+            None => REFERENCE_S,
+        };
         for (best, coarser, made) in ladder {
             let setting = exact(best.0, best.1);
             if self.store.find(&setting, self.options.timed_s).is_none()
-                && !can_be_prepared(&setting)?
+                && !can_be_prepared(&setting, limit_s)?
             {
                 continue;
             }
@@ -365,15 +372,15 @@ impl Runner<'_, '_> {
     }
 }
 
-/// Whether the forecast of preparing is within [`REFERENCE_S`] and memory.
-fn can_be_prepared(setting: &Setting) -> Result<bool, Error> {
+/// Whether the forecast of preparing is within time and memory.
+fn can_be_prepared(setting: &Setting, limit_s: f64) -> Result<bool, Error> {
     let mut spec = setup::part_spec(&setting.scene)?;
     spec.refinements = setting.refinements;
     let Ok(loaded) = load(&spec) else {
         return Ok(false);
     };
     let forecast = Forecast::of(&loaded);
-    Ok(forecast.seconds < REFERENCE_S && forecast.refuse_what_cannot_fit(&loaded).is_ok())
+    Ok(forecast.seconds < limit_s && forecast.refuse_what_cannot_fit(&loaded).is_ok())
 }
 
 /// A folder that results may be written into: new, empty, or of an earlier study.

@@ -107,6 +107,70 @@ pub(crate) fn cube(order: Order, n: usize, map: impl Fn([f64; 3]) -> [f64; 3]) -
     mesh
 }
 
+/// A straight block from the origin, `n` cells of six tetrahedra along each axis. Groups `fixed` (x = 0)
+/// and `load` (largest x).
+pub(crate) fn block(order: Order, n: [usize; 3], size: [f64; 3]) -> Mesh {
+    const PATHS: [[usize; 3]; 6] = [
+        [0, 1, 2],
+        [1, 2, 0],
+        [2, 0, 1],
+        [0, 2, 1],
+        [2, 1, 0],
+        [1, 0, 2],
+    ];
+    let vertex = |at: [usize; 3]| -> [f64; 3] {
+        std::array::from_fn(|c| size[c] * at[c] as f64 / n[c] as f64)
+    };
+    let (mut nodes, mut elements) = (Vec::new(), Vec::new());
+    let mut known: HashMap<[i64; 3], u32> = HashMap::new();
+    for cell in 0..n[0] * n[1] * n[2] {
+        let corner = [cell % n[0], cell / n[0] % n[1], cell / n[0] / n[1]];
+        for (k, path) in PATHS.iter().enumerate() {
+            let mut at = corner;
+            let mut vertices = [vertex(at); 4];
+            for (step, &axis) in path.iter().enumerate() {
+                at[axis] += 1;
+                vertices[step + 1] = vertex(at);
+            }
+            // Odd permutations of the axes turn the element inside out.
+            if k >= 3 {
+                vertices.swap(1, 2);
+            }
+            for l in order.node_coordinates() {
+                let x: [f64; 3] =
+                    std::array::from_fn(|c| (0..4).map(|v| l[v] * vertices[v][c]).sum());
+                let key = std::array::from_fn(|c| (1e6 * x[c] / size[c]).round() as i64);
+                elements.push(*known.entry(key).or_insert_with(|| {
+                    nodes.push(x);
+                    nodes.len() as u32 - 1
+                }));
+            }
+        }
+    }
+    let n_elements = elements.len() / order.nodes_per_element();
+    let tags = (1..=nodes.len() as u64).collect();
+    let of_elements = (1..=n_elements as u64).collect();
+    let mut mesh = Mesh::new(order, nodes, tags, elements, of_elements, vec![]);
+    mesh.groups = [("fixed", 0.0), ("load", size[0])]
+        .map(|(name, at)| {
+            let mut faces = mesh.boundary_faces();
+            let is_there = |i: &u32| (mesh.nodes[*i as usize][0] - at).abs() < 1e-9 * size[0];
+            faces.retain(|f| f.nodes.iter().all(is_there));
+            let mut nodes: Vec<u32> = faces.iter().flat_map(|f| f.nodes.clone()).collect();
+            nodes.sort_unstable();
+            nodes.dedup();
+            Group {
+                name: name.to_owned(),
+                dimension: 2,
+                nodes,
+                faces,
+                elements: vec![],
+            }
+        })
+        .to_vec();
+    mesh
+}
+
 /// Bends a cube so that most edges are curved and all elements stay valid.
 pub(crate) fn bend([x, y, z]: [f64; 3]) -> [f64; 3] {
     [

@@ -3,8 +3,10 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 mod common;
+mod constrained;
 mod convergence;
 mod energy;
+mod hierarchy;
 mod patch;
 mod quality;
 mod raise;

@@ -61,7 +61,7 @@ fn plot(
         limit: is_step.then_some((PERIOD_US, "1 ms")),
         bar: study.reference.bar,
     };
-    draw(study, &scale, of, &|e| e.wrench_l2)
+    draw(study, &scale, &|_| true, of, &|e| e.wrench_l2)
 }
 
 /// Error against the exact solution on the same mesh over the time of a step.
@@ -72,14 +72,16 @@ fn solver_plot(study: &Study) -> Result<String, Box<dyn std::error::Error>> {
         limit: Some((PERIOD_US, "1 ms")),
         bar: None,
     };
-    draw(study, &scale, &|m| [m.step.p50, m.step.p999], &|e| {
-        e.solver_l2
-    })
+    // Other orders and meshes are their own exact solutions.
+    let of_solver = |axis: Axis| !matches!(axis, Axis::Order | Axis::Mesh | Axis::Quadrature);
+    let times = |m: &Measured| [m.step.p50, m.step.p999];
+    draw(study, &scale, &of_solver, &times, &|e| e.solver_l2)
 }
 
 fn draw(
     study: &Study,
     scale: &Scale,
+    is_shown: &dyn Fn(Axis) -> bool,
     cost_of: &dyn Fn(&Measured) -> [f64; 2],
     error_of: &dyn Fn(&Errors) -> f64,
 ) -> Result<String, Box<dyn std::error::Error>> {
@@ -87,6 +89,7 @@ fn draw(
     let all: Vec<(&Row, [f64; 2], f64)> = study
         .rows
         .iter()
+        .filter(|row| is_shown(row.axis))
         .filter_map(|row| {
             let (measured, errors) = row.outcome.as_ref().ok()?;
             let cost = cost_of(measured).map(|c| c.max(1e-6));

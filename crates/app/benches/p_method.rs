@@ -15,6 +15,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use glamx::DPose3;
+use snapin::engine::Engine;
 use snapin::machine::Machine;
 use snapin::prepare::{PrepareOptions, cache, prepare};
 use snapin::progress::Ui;
@@ -25,12 +26,25 @@ use snapin::shape::Shape;
 const STEPS: u32 = 1000;
 const ROUNDS: u32 = 8;
 
+struct Variant {
+    name: String,
+    is_adaptive: bool,
+    n_nodes: usize,
+    engine: Engine,
+    shape: Shape,
+    targets: Vec<DPose3>,
+    steps: Vec<u64>,
+    shapes: Vec<u64>,
+    sums: Vec<u64>,
+    free: usize,
+}
+
 fn main() {
     println!("{}", Machine::read().summary());
-    println!("microseconds; step + shape lies between linear and full quadratic for \"select\"\n");
+    println!("microseconds; variants take turns, so that a drift of the machine meets all alike\n");
     println!(
-        "{:<34}{:>8}{:>10}{:>10}{:>10}{:>10}{:>10}{:>12}",
-        "", "nodes", "free", "step p50", "p99.9", "shape p50", "p99.9", "step+shape"
+        "{:<34}{:>8}{:>8}{:>10}{:>10}{:>11}{:>10}{:>12}",
+        "", "nodes", "free", "step p50", "p99.9", "shape p50", "p99.9", "sum p50"
     );
     for mesh in ["clip.msh", "clip-medium.msh", "clip-fine.msh"] {
         println!("{mesh}");
@@ -38,20 +52,27 @@ fn main() {
             method,
             free: FreeNodes::Radius(radius),
         };
-        measure(mesh, "linear", 1, Adaptive::Off);
+        let mut variants = vec![variant(mesh, "linear", 1, Adaptive::Off)];
         for radius in [0.0, 2e-3, 4e-3] {
             let name = format!("quadratic, select {} mm", 1e3 * radius);
-            measure(mesh, &name, 2, on(PMethod::Select, radius));
+            variants.push(variant(mesh, &name, 2, on(PMethod::Select, radius)));
         }
-        measure(mesh, "full quadratic", 2, Adaptive::Off);
+        variants.push(variant(mesh, "full quadratic", 2, Adaptive::Off));
         if mesh != "clip-fine.msh" {
             let name = "quadratic, constrain 2 mm";
-            measure(mesh, name, 2, on(PMethod::Constrain, 2e-3));
+            variants.push(variant(mesh, name, 2, on(PMethod::Constrain, 2e-3)));
         }
+        // The first round warms up.
+        for round in 0..=ROUNDS {
+            for variant in &mut variants {
+                variant.push_in(round > 0);
+            }
+        }
+        variants.iter_mut().for_each(Variant::print);
     }
 }
 
-fn measure(mesh: &str, name: &str, order: u8, adaptive: Adaptive) {
+fn variant(mesh: &str, name: &str, order: u8, adaptive: Adaptive) -> Variant {
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
     let mut scene = Scene::load(&scenes.join("clip.toml")).unwrap();
     scene.part.mesh = scenes.join(mesh);
@@ -65,50 +86,65 @@ fn measure(mesh: &str, name: &str, order: u8, adaptive: Adaptive) {
     };
     let prepared = prepare(&setup::part_spec(&scene).unwrap(), &options, &ui).unwrap();
     let (tool, _) = setup::tool(&scene).unwrap();
-    let mut engine = setup::engine(&scene, &prepared, tool).unwrap();
-    let mut shape = Shape::new(&prepared, &scene.accuracy).unwrap();
     let start = scene.tool.pose_part_tool;
     let way = scene.hand.travel * scene.hand.direction;
-    let (mut steps, mut shapes, mut sums) = (Vec::new(), Vec::new(), Vec::new());
-    let mut free = 0;
-    for round in 0..=ROUNDS {
-        engine.reset();
-        for step in 0..=STEPS {
-            let share = f64::from(step) / f64::from(STEPS);
-            let target = DPose3 {
-                translation: start.translation + share * way,
+    Variant {
+        name: name.to_owned(),
+        is_adaptive: adaptive != Adaptive::Off,
+        n_nodes: prepared.loaded.mesh.n_nodes(),
+        engine: setup::engine(&scene, &prepared, tool).unwrap(),
+        shape: Shape::new(&prepared, &scene.accuracy).unwrap(),
+        targets: (0..=STEPS)
+            .map(|step| DPose3 {
+                translation: start.translation + f64::from(step) / f64::from(STEPS) * way,
                 ..start
-            };
+            })
+            .collect(),
+        steps: Vec::new(),
+        shapes: Vec::new(),
+        sums: Vec::new(),
+        free: 0,
+    }
+}
+
+impl Variant {
+    fn push_in(&mut self, counts: bool) {
+        self.engine.reset();
+        for target in &self.targets {
             let begun = Instant::now();
-            let report = engine.step(&target);
+            let report = self.engine.step(target);
             let stepped = begun.elapsed();
-            shape.update(&mut engine).unwrap();
+            self.shape.update(&mut self.engine).unwrap();
             let all = begun.elapsed();
-            // The first round warms up.
-            if round > 0 && report.contacts > 0 {
-                steps.push(stepped.as_nanos() as u64);
-                shapes.push((all - stepped).as_nanos() as u64);
-                sums.push(all.as_nanos() as u64);
-                free = free.max(shape.n_free().unwrap_or(report.free_nodes as usize));
+            if counts && report.contacts > 0 {
+                self.steps.push(stepped.as_nanos() as u64);
+                self.shapes.push((all - stepped).as_nanos() as u64);
+                self.sums.push(all.as_nanos() as u64);
+                let free = self.shape.n_free().unwrap_or(report.free_nodes as usize);
+                self.free = self.free.max(free);
             }
         }
     }
-    let at = |times: &mut Vec<u64>, q: f64| {
-        times.sort_unstable();
-        1e-3 * times[(q * (times.len() - 1) as f64) as usize] as f64
-    };
-    println!(
-        "  {name:<32}{:>8}{:>10}{:>10.1}{:>10.1}{:>10.1}{:>10.1}{:>12.1}",
-        prepared.loaded.mesh.n_nodes(),
-        if adaptive == Adaptive::Off {
-            "-".to_owned()
-        } else {
-            free.to_string()
-        },
-        at(&mut steps, 0.5),
-        at(&mut steps, 0.999),
-        at(&mut shapes, 0.5),
-        at(&mut shapes, 0.999),
-        at(&mut sums, 0.5),
-    );
+
+    fn print(&mut self) {
+        let at = |times: &mut Vec<u64>, q: f64| {
+            times.sort_unstable();
+            1e-3 * times[(q * (times.len() - 1) as f64) as usize] as f64
+        };
+        println!(
+            "  {:<32}{:>8}{:>8}{:>10.1}{:>10.1}{:>11.1}{:>10.1}{:>12.1}",
+            self.name,
+            self.n_nodes,
+            if self.is_adaptive {
+                self.free.to_string()
+            } else {
+                "-".to_owned()
+            },
+            at(&mut self.steps, 0.5),
+            at(&mut self.steps, 0.999),
+            at(&mut self.shapes, 0.5),
+            at(&mut self.shapes, 0.999),
+            at(&mut self.sums, 0.5),
+        );
+    }
 }

@@ -349,20 +349,19 @@ impl Accuracy {
             scalar: Scalar::F64,
             multiply: Multiply::Auto,
         };
-        let where_seen = Adaptive::On {
+        let draw = |free| Adaptive::On {
             method: PMethod::Select,
-            free: FreeNodes::Indicator(SEEN_BEND),
+            free,
         };
         match preset {
             Some(Preset::Fast) => Self {
-                adaptive: where_seen,
+                adaptive: draw(FreeNodes::Radius(0.0)),
                 contact_iterations: ContactIterations::Times(2),
                 lcp_tolerance: 1e-6,
-                scalar: Scalar::F32,
                 ..plain
             },
             Some(Preset::Balanced) => Self {
-                adaptive: where_seen,
+                adaptive: draw(FreeNodes::Indicator(SEEN_BEND)),
                 ..plain
             },
             Some(Preset::Exact) => Self {
@@ -422,7 +421,7 @@ const SEEN_BEND: f64 = 1e-3;
 /// A goal that stands for all settings of accuracy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Preset {
-    /// Two passes over the contact planes, drawn shape interpolated and in 32 bits.
+    /// Two passes over the contact planes, shape drawn between the elements' vertices.
     Fast,
     /// Converged planes; interface nodes free where the part is seen to bend.
     Balanced,

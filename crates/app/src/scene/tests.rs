@@ -524,9 +524,9 @@ fn a_preset_sets_all_and_a_key_beside_it_wins() {
     let scene = with("title = \"Clip\"", "accuracy = \"exact\"").unwrap();
     assert_eq!(scene.part.order, Some(3));
     assert_eq!(scene.accuracy, Accuracy::of(Some(Preset::Exact)));
-    let scene = adding("[accuracy]\npreset = \"fast\"\nscalar = \"f64\"\n").unwrap();
+    let scene = adding("[accuracy]\npreset = \"fast\"\nscalar = \"f32\"\n").unwrap();
     assert_eq!(scene.part.order, None);
-    assert_eq!(scene.accuracy.scalar, Scalar::F64);
+    assert_eq!(scene.accuracy.scalar, Scalar::F32);
     assert_eq!(
         scene.accuracy.contact_iterations,
         ContactIterations::Times(2)

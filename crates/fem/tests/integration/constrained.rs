@@ -273,7 +273,7 @@ fn freeing_only_near_the_load_leaves_an_arm_too_stiff() {
     ] {
         let (ratios, compliance, lost) = stiffness_over_full(cells);
         let n = 6 * cells.iter().product::<usize>();
-        println!("{n} elements: {ratios:.3?}, {compliance:.5e} m/N, {lost:.4}");
+        eprintln!("{n} elements: {ratios:.3?}, {compliance:.5e} m/N, {lost:.4}");
         for (ratio, published) in ratios.iter().zip(published) {
             assert!(
                 (ratio / published - 1.0).abs() < 0.2,

@@ -81,11 +81,11 @@ pub(in crate::scene) enum MultiplyRaw {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub(in crate::scene) enum PresetRaw {
-    /// two passes over the contact planes, 32-bit surface.
+    /// two passes over the contact planes, shape drawn between the elements' vertices.
     Fast,
-    /// converged contact planes, interface nodes free near the contact.
+    /// converged contact planes, shape drawn exactly where it is seen to bend.
     Balanced,
-    /// one order higher, everything converged and free.
+    /// order 3, everything converged and free.
     Exact,
 }
 

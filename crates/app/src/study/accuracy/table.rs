@@ -54,6 +54,11 @@ impl Study {
             .filter(|(_, m, e)| !fits(m) && e.wrench_l2 < errors.wrench_l2)
             .min_by(by_error);
         let gives_up = match better {
+            Some((other, m, e)) if e.wrench_l2 == 0.0 => format!(
+                "; {}, the reference itself, needs {} µs",
+                name(other),
+                short(m.step.p999)
+            ),
             Some((other, m, e)) => format!(
                 "; {} would be within {} but needs {} µs",
                 name(other),
@@ -63,6 +68,10 @@ impl Study {
             None => "; nothing that was measured is more accurate".to_owned(),
         };
         let bar = match self.reference.bar {
+            Some(bar) if errors.wrench_l2 == 0.0 => format!(
+                " because it is the reference, which is known to {}",
+                percent(bar)
+            ),
             Some(bar) if errors.wrench_l2 <= bar => format!(
                 ", no more than the {} by which the reference itself may be wrong",
                 percent(bar)

@@ -26,6 +26,7 @@ impl<'a> Ui<'a> {
 
     /// One line to the user, beside the result.
     pub fn note(&self, line: &str) {
+        self.end_status();
         // A closed error stream is no reason to lose a result.
         let _ = writeln!(self.err.borrow_mut(), "{line}");
     }

@@ -327,6 +327,8 @@ pub struct Accuracy {
     pub near_distance: Option<f64>,
     /// Largest scaled residual of the contact solution, in [1e-15, 1e-2].
     pub lcp_tolerance: f64,
+    /// Rounds of pivoting in one contact problem; `None`: as many as it takes.
+    pub lcp_rounds: Option<usize>,
     /// Planes kept in one step, the deepest first.
     pub max_contacts: usize,
     /// Number type of the displacement multiply.
@@ -345,6 +347,7 @@ impl Accuracy {
             contact_iterations: ContactIterations::Converged,
             near_distance: None,
             lcp_tolerance: raw::default::LCP_TOLERANCE,
+            lcp_rounds: None,
             max_contacts: raw::default::MAX_CONTACTS as usize,
             scalar: Scalar::F64,
             multiply: Multiply::Auto,

@@ -140,10 +140,7 @@ pub fn engine(scene: &Scene, prepared: &PreparedPart, tool: Tool) -> Result<Engi
         displacement_tolerance: DISPLACEMENT_TOLERANCE,
         near_distance: scene.accuracy.near_distance.unwrap_or(NEAR_SHARE * size),
         max_contacts: scene.accuracy.max_contacts,
-        lcp: lcp::Settings {
-            tolerance: scene.accuracy.lcp_tolerance,
-            ..lcp::Settings::default()
-        },
+        lcp: lcp_settings(scene),
         max_stride: STRIDE_SHARE * size,
     };
     let coupling = VirtualCoupling::new(
@@ -177,6 +174,26 @@ pub fn engine(scene: &Scene, prepared: &PreparedPart, tool: Tool) -> Result<Engi
         path: scene.path.clone(),
         source,
     })
+}
+
+/// Sweeps of Gauss-Seidel for each round of pivoting that was allowed: a sweep costs about a tenth of
+/// a round.
+const SWEEPS_PER_ROUND: usize = 10;
+
+fn lcp_settings(scene: &Scene) -> lcp::Settings {
+    let exact = lcp::Settings {
+        tolerance: scene.accuracy.lcp_tolerance,
+        ..lcp::Settings::default()
+    };
+    match scene.accuracy.lcp_rounds {
+        None => exact,
+        Some(rounds) => lcp::Settings {
+            max_rounds: rounds,
+            max_pivots: 0,
+            max_sweeps: SWEEPS_PER_ROUND * rounds,
+            ..exact
+        },
+    }
 }
 
 /// m. A nanometre on a part of 10 kN/m is a hundred-thousandth of a newton.

@@ -69,14 +69,17 @@ pub(super) fn run(args: &AccuracyArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Resu
     };
     let study = accuracy::run(&scene, &options, &args.cache.options(false), ui);
     ui.end_status();
-    let study = study.inspect_err(|e| {
-        if e.is_interrupt() {
+    let study = match study {
+        Err(e) if e.is_interrupt() => {
             ui.note(&format!(
-                "what was finished is kept in {}; the same command goes on from there",
+                "stopped by Ctrl-C; what was finished is kept in {}, and the same command goes on from \
+                 there",
                 target.join("points").display()
             ));
+            return Ok(e.exit_code());
         }
-    })?;
+        study => study?,
+    };
     if study.n_resumed > 0 {
         ui.note(&format!(
             "{} settings were finished before and are used again (--fresh measures all anew)",

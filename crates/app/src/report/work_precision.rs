@@ -37,8 +37,8 @@ pub struct Scale {
     pub bar: Option<f64>,
 }
 
-/// Colours of the lines; an eleventh line begins again.
-const COLOURS: [RGBColor; 10] = [
+/// Colours of the lines; a twelfth line begins again.
+const COLOURS: [RGBColor; 11] = [
     BLUE,
     VERMILLION,
     GREEN,
@@ -49,6 +49,7 @@ const COLOURS: [RGBColor; 10] = [
     RGBColor(150, 110, 60),
     RGBColor(130, 130, 130),
     RGBColor(0, 95, 75),
+    RGBColor(120, 40, 40),
 ];
 
 /// Forces that people tell apart differ by 7 to 10 %; 5 % is the aim.

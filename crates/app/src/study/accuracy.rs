@@ -241,7 +241,11 @@ impl Runner<'_, '_> {
             let left = crate::prepare::budget::duration(each * (n - k) as f64);
             format!(", about {left} left")
         };
-        self.ui.status(&format!("{} of {n}: {what}{left}", k + 1));
+        const WIDTH: usize = 24;
+        let full = WIDTH * k / n.max(1);
+        let bar = "█".repeat(full) + &"░".repeat(WIDTH - full);
+        let line = format!("{bar} {} of {n}: {what}{left}", k + 1);
+        self.ui.status(&line);
     }
 
     /// The setting's result: of this run, of an earlier one, or anew.

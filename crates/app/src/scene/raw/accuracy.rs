@@ -252,6 +252,11 @@ pub(in crate::scene) struct AccuracyKeys {
     /// what is beyond it is reported.
     #[schemars(extend("x-quantity" = "number", "default" = default::LCP_TOLERANCE))]
     pub(in crate::scene) lcp_tolerance: Option<At<f64>>,
+    /// Rounds of principal pivoting in one contact problem, 1 to 1000, and then ten times as many
+    /// sweeps of Gauss-Seidel; the best answer is taken and what is not solved is reported. Without
+    /// this key there is no such budget: the exact answer is found.
+    #[schemars(range(min = 1, max = 1000), extend("x-default" = "no budget"))]
+    pub(in crate::scene) lcp_rounds: Option<At<i64>>,
     /// Contact planes in one step, 1 to 5000; beyond it the deepest are kept and the rest is
     /// counted and reported.
     #[schemars(range(min = 1, max = 5000), extend("default" = default::MAX_CONTACTS))]

@@ -54,6 +54,10 @@ impl Check<'_> {
                 Some(at) => self.lcp_tolerance(at)?,
                 None => base.lcp_tolerance,
             },
+            lcp_rounds: match &raw.lcp_rounds {
+                Some(at) => Some(self.integer("lcp_rounds", at, 1, 1000)? as usize),
+                None => None,
+            },
             max_contacts: max_contacts as usize,
             scalar: match raw.scalar.as_ref().map(|at| at.value) {
                 Some(ScalarRaw::F32) => Scalar::F32,
@@ -98,6 +102,7 @@ impl Check<'_> {
             ("adaptive", raw.adaptive.is_some()),
             ("contact_iterations", raw.contact_iterations.is_some()),
             ("lcp_tolerance", raw.lcp_tolerance.is_some()),
+            ("lcp_rounds", raw.lcp_rounds.is_some()),
             ("scalar", raw.scalar.is_some()),
         ];
         match beside.into_iter().find(|(_, is_there)| *is_there) {

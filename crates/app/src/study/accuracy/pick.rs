@@ -10,6 +10,9 @@ use crate::report::plot::short;
 use crate::scene::{Accuracy, ContactIterations, Preset, Scene};
 use crate::session::part_extent;
 
+/// Errors that differ by less than this are equal but for chance.
+const AS_GOOD: f64 = 1.02;
+
 /// s of timed steps for each rung: some ten thousand steps on a small part.
 const TIMED_S: f64 = 0.3;
 
@@ -121,8 +124,14 @@ fn pick(rungs: &[Rung], budget_us: f64) -> Result<Picked, String> {
     let keeps = |rung: &Rung| rung.p999_us <= budget_us;
     let by_error = |a: &&usize, b: &&usize| rungs[**a].error.total_cmp(&rungs[**b].error);
     let all: Vec<usize> = (0..rungs.len()).collect();
-    let best = all.iter().filter(|k| keeps(&rungs[**k])).min_by(by_error);
-    let Some(&best) = best else {
+    let least = all
+        .iter()
+        .filter(|k| keeps(&rungs[**k]))
+        .map(|k| rungs[*k].error)
+        .fold(f64::INFINITY, f64::min);
+    // Of those that are as good but for chance, the highest.
+    let as_good = |k: &&usize| keeps(&rungs[**k]) && rungs[**k].error <= AS_GOOD * least;
+    let Some(&best) = all.iter().find(as_good) else {
         let nearest = rungs.iter().min_by(|a, b| a.p999_us.total_cmp(&b.p999_us));
         return Err(match nearest {
             Some(rung) => format!(
@@ -144,15 +153,17 @@ fn pick(rungs: &[Rung], budget_us: f64) -> Result<Picked, String> {
         let (name, p999) = (&rungs[*k].name, short(rungs[*k].p999_us));
         format!("; {name}, the next more accurate, needs {p999} us")
     });
+    let apart = match best {
+        0 => "the most accurate of all".to_owned(),
+        _ => format!("{} % from {}", short(100.0 * rung.error), rungs[0].name),
+    };
     Ok(Picked {
         rung: best,
         why: format!(
-            "accuracy.budget_us = {budget_us}: picked {}, 99.9 % of whose steps take less than {} us here, {} % \
-             from {}{next}",
+            "accuracy.budget_us = {budget_us}: picked {}, 99.9 % of whose steps take less than {} us here, \
+             {apart}{next}",
             rung.name,
             short(rung.p999_us),
-            short(100.0 * rung.error),
-            rungs[0].name
         ),
     })
 }
@@ -187,6 +198,10 @@ mod tests {
         );
         assert_eq!(pick(&rungs(), 1000.0).unwrap().rung, 0);
         assert_eq!(pick(&rungs(), 35.0).unwrap().rung, 3);
+        // A lower rung that is better by chance only is not picked.
+        let mut close = rungs();
+        close[2].error = 0.0499;
+        assert_eq!(pick(&close, 200.0).unwrap().rung, 1);
     }
 
     #[test]

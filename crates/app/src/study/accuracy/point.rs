@@ -23,6 +23,8 @@ pub enum Axis {
     Constrain,
     /// Tolerance of the complementarity problem.
     LcpTolerance,
+    /// Rounds of pivoting in a complementarity problem.
+    LcpRounds,
     /// Planes kept in a step.
     MaxContacts,
     /// Number type of the drawn shape.
@@ -35,13 +37,14 @@ pub enum Axis {
 
 impl Axis {
     /// All, in the order of the tables.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Order,
         Self::Mesh,
         Self::Planes,
         Self::Select,
         Self::Constrain,
         Self::LcpTolerance,
+        Self::LcpRounds,
         Self::MaxContacts,
         Self::Scalar,
         Self::Quadrature,
@@ -57,6 +60,7 @@ impl Axis {
             Self::Select => "select",
             Self::Constrain => "constrain",
             Self::LcpTolerance => "lcp",
+            Self::LcpRounds => "lcp-budget",
             Self::MaxContacts => "contacts",
             Self::Scalar => "scalar",
             Self::Quadrature => "quadrature",
@@ -73,6 +77,7 @@ impl Axis {
             Self::Select => "p-method: select (free nodes drawn)",
             Self::Constrain => "p-method: constrain (free nodes solved)",
             Self::LcpTolerance => "LCP tolerance",
+            Self::LcpRounds => "LCP budget",
             Self::MaxContacts => "contacts kept",
             Self::Scalar => "numbers of the drawn shape",
             Self::Quadrature => "quadrature",
@@ -251,6 +256,13 @@ pub(super) fn points(scene: &Scene, axes: &[Axis], own_order: u8, extent: f64) -
                         s.scene.accuracy.lcp_tolerance = tolerance;
                     });
                 }
+            }
+            Axis::LcpRounds => {
+                for rounds in [1, 2, 4] {
+                    let label = format!("{rounds} rounds").replace("1 rounds", "1 round");
+                    add(label, &|s| s.scene.accuracy.lcp_rounds = Some(rounds));
+                }
+                add("none".to_owned(), &|s| s.scene.accuracy.lcp_rounds = None);
             }
             Axis::MaxContacts => {
                 for most in [8, 16, 32, 500] {

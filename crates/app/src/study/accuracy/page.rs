@@ -93,6 +93,10 @@ fn draw(
         .filter_map(|row| {
             let (measured, errors) = row.outcome.as_ref().ok()?;
             let cost = cost_of(measured).map(|c| c.max(1e-6));
+            // The reference itself has no error to show.
+            if scale.bar.is_some() && error_of(errors) == 0.0 {
+                return None;
+            }
             Some((row, cost, error_of(errors).max(LEAST_ERROR)))
         })
         .collect();

@@ -7,6 +7,7 @@
 //!
 //! Everything here is in the part's frame; the session converts from and to the world.
 
+mod clock;
 mod constrained;
 mod part;
 mod report;
@@ -15,7 +16,6 @@ mod switch;
 mod watch_list;
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use contact::delassus::{CouplingCompliance, delassus_into};
 use contact::lcp;
@@ -27,6 +27,7 @@ use glamx::DPose3;
 
 use crate::free_nodes::LOOSE_RADIUS;
 
+use clock::StageClock;
 use constrained::Constrained;
 pub use constrained::{BubbleData, FreeSettings};
 pub use part::ContactPart;
@@ -479,23 +480,4 @@ fn reach_of_rotation(tool: &Tool, part: &ContactPart) -> f64 {
         high = high.max(x);
     }
     tool.characteristic_size().min((high - low).length())
-}
-
-/// Adds the time between laps to the stages. It is never read by the computation.
-struct StageClock {
-    last: Instant,
-}
-
-impl StageClock {
-    fn start() -> Self {
-        Self {
-            last: Instant::now(),
-        }
-    }
-
-    fn lap(&mut self, stage: Stage, report: &mut StepReport) {
-        let now = Instant::now();
-        report.stage_ns[stage as usize] += (now - self.last).as_nanos() as u64;
-        self.last = now;
-    }
 }

@@ -21,14 +21,6 @@ pub(crate) fn read(name: &str) -> Mesh {
 /// cell, straight edges; then every node is moved by `map`, which bends the edges if it is not
 /// affine. Groups `fixed` (x = 0), `load` (x = 1) and `surface`.
 pub(crate) fn cube(order: Order, n: usize, map: impl Fn([f64; 3]) -> [f64; 3]) -> Mesh {
-    const PATHS: [[usize; 3]; 6] = [
-        [0, 1, 2],
-        [1, 2, 0],
-        [2, 0, 1],
-        [0, 2, 1],
-        [2, 1, 0],
-        [1, 0, 2],
-    ];
     let vertex = |at: [usize; 3]| -> [f64; 3] {
         let is_inner = at.iter().all(|i| *i > 0 && *i < n);
         std::array::from_fn(|c| {
@@ -41,66 +33,12 @@ pub(crate) fn cube(order: Order, n: usize, map: impl Fn([f64; 3]) -> [f64; 3]) -
             (at[c] as f64 + shift) / n as f64
         })
     };
-    let mut nodes = Vec::new();
-    let mut elements = Vec::new();
-    let mut known: HashMap<[i64; 3], u32> = HashMap::new();
-    for cell in 0..n * n * n {
-        let corner = [cell % n, cell / n % n, cell / n / n];
-        for (k, path) in PATHS.iter().enumerate() {
-            let mut at = corner;
-            let mut vertices = [vertex(at); 4];
-            for (step, &axis) in path.iter().enumerate() {
-                at[axis] += 1;
-                vertices[step + 1] = vertex(at);
-            }
-            // Odd permutations of the axes turn the element inside out.
-            if k >= 3 {
-                vertices.swap(1, 2);
-            }
-            for l in order.node_coordinates() {
-                let x: [f64; 3] =
-                    std::array::from_fn(|c| (0..4).map(|v| l[v] * vertices[v][c]).sum());
-                let index = *known
-                    .entry(x.map(|c| (c * 1e7).round() as i64))
-                    .or_insert_with(|| {
-                        nodes.push(x);
-                        nodes.len() as u32 - 1
-                    });
-                elements.push(index);
-            }
-        }
-    }
-    let n_elements = elements.len() / order.nodes_per_element();
-    let tags = (1..=nodes.len() as u64).collect();
-    let straight = Mesh::new(
-        order,
-        nodes,
-        tags,
-        elements,
-        (1..=n_elements as u64).collect(),
-        vec![],
-    );
-    let group = |name: &str, holds: &dyn Fn([f64; 3]) -> bool| {
-        let mut faces = straight.boundary_faces();
-        faces.retain(|f| f.nodes.iter().all(|&i| holds(straight.nodes[i as usize])));
-        let mut nodes: Vec<u32> = faces.iter().flat_map(|f| f.nodes.clone()).collect();
-        nodes.sort_unstable();
-        nodes.dedup();
-        Group {
-            name: name.to_owned(),
-            dimension: 2,
-            nodes,
-            faces,
-            elements: vec![],
-        }
-    };
-    let groups = vec![
-        group("fixed", &|x| x[0].abs() < 1e-9),
-        group("load", &|x| (x[0] - 1.0).abs() < 1e-9),
-        group("surface", &|_| true),
+    let mut mesh = cells(order, [n; 3], [1.0; 3], vertex);
+    mesh.groups = vec![
+        group(&mesh, "fixed", &|x| x[0].abs() < 1e-9),
+        group(&mesh, "load", &|x| (x[0] - 1.0).abs() < 1e-9),
+        group(&mesh, "surface", &|_| true),
     ];
-    let mut mesh = straight.clone();
-    mesh.groups = groups;
     for x in &mut mesh.nodes {
         *x = map(*x);
     }
@@ -110,6 +48,22 @@ pub(crate) fn cube(order: Order, n: usize, map: impl Fn([f64; 3]) -> [f64; 3]) -
 /// A straight block from the origin, `n` cells of six tetrahedra along each axis. Groups `fixed` (x = 0)
 /// and `load` (largest x).
 pub(crate) fn block(order: Order, n: [usize; 3], size: [f64; 3]) -> Mesh {
+    let vertex = |at: [usize; 3]| std::array::from_fn(|c| size[c] * at[c] as f64 / n[c] as f64);
+    let mut mesh = cells(order, n, size, vertex);
+    mesh.groups = vec![
+        group(&mesh, "fixed", &|x| x[0].abs() < 1e-9 * size[0]),
+        group(&mesh, "load", &|x| (x[0] - size[0]).abs() < 1e-9 * size[0]),
+    ];
+    mesh
+}
+
+/// Cells of six tetrahedra with straight edges; `size` says which coordinates are equal.
+fn cells(
+    order: Order,
+    n: [usize; 3],
+    size: [f64; 3],
+    vertex: impl Fn([usize; 3]) -> [f64; 3],
+) -> Mesh {
     const PATHS: [[usize; 3]; 6] = [
         [0, 1, 2],
         [1, 2, 0],
@@ -118,9 +72,6 @@ pub(crate) fn block(order: Order, n: [usize; 3], size: [f64; 3]) -> Mesh {
         [2, 1, 0],
         [1, 0, 2],
     ];
-    let vertex = |at: [usize; 3]| -> [f64; 3] {
-        std::array::from_fn(|c| size[c] * at[c] as f64 / n[c] as f64)
-    };
     let (mut nodes, mut elements) = (Vec::new(), Vec::new());
     let mut known: HashMap<[i64; 3], u32> = HashMap::new();
     for cell in 0..n[0] * n[1] * n[2] {
@@ -139,7 +90,7 @@ pub(crate) fn block(order: Order, n: [usize; 3], size: [f64; 3]) -> Mesh {
             for l in order.node_coordinates() {
                 let x: [f64; 3] =
                     std::array::from_fn(|c| (0..4).map(|v| l[v] * vertices[v][c]).sum());
-                let key = std::array::from_fn(|c| (1e6 * x[c] / size[c]).round() as i64);
+                let key = std::array::from_fn(|c| (1e7 * x[c] / size[c]).round() as i64);
                 elements.push(*known.entry(key).or_insert_with(|| {
                     nodes.push(x);
                     nodes.len() as u32 - 1
@@ -150,25 +101,23 @@ pub(crate) fn block(order: Order, n: [usize; 3], size: [f64; 3]) -> Mesh {
     let n_elements = elements.len() / order.nodes_per_element();
     let tags = (1..=nodes.len() as u64).collect();
     let of_elements = (1..=n_elements as u64).collect();
-    let mut mesh = Mesh::new(order, nodes, tags, elements, of_elements, vec![]);
-    mesh.groups = [("fixed", 0.0), ("load", size[0])]
-        .map(|(name, at)| {
-            let mut faces = mesh.boundary_faces();
-            let is_there = |i: &u32| (mesh.nodes[*i as usize][0] - at).abs() < 1e-9 * size[0];
-            faces.retain(|f| f.nodes.iter().all(is_there));
-            let mut nodes: Vec<u32> = faces.iter().flat_map(|f| f.nodes.clone()).collect();
-            nodes.sort_unstable();
-            nodes.dedup();
-            Group {
-                name: name.to_owned(),
-                dimension: 2,
-                nodes,
-                faces,
-                elements: vec![],
-            }
-        })
-        .to_vec();
-    mesh
+    Mesh::new(order, nodes, tags, elements, of_elements, vec![])
+}
+
+/// The faces of the boundary all of whose nodes are there.
+fn group(mesh: &Mesh, name: &str, is_there: &dyn Fn([f64; 3]) -> bool) -> Group {
+    let mut faces = mesh.boundary_faces();
+    faces.retain(|f| f.nodes.iter().all(|&i| is_there(mesh.nodes[i as usize])));
+    let mut nodes: Vec<u32> = faces.iter().flat_map(|f| f.nodes.clone()).collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    Group {
+        name: name.to_owned(),
+        dimension: 2,
+        nodes,
+        faces,
+        elements: vec![],
+    }
 }
 
 /// Bends a cube so that most edges are curved and all elements stay valid.

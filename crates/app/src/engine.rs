@@ -29,7 +29,7 @@ use crate::free_nodes::LOOSE_RADIUS;
 
 use clock::StageClock;
 use constrained::Constrained;
-pub use constrained::{BubbleData, FreeSettings};
+pub use constrained::{BubbleData, FreeSettings, MOST_FREE};
 pub use part::ContactPart;
 use part::Deformed;
 pub use report::{ActiveContact, N_STAGES, Stage, StepReport};

@@ -1,4 +1,4 @@
-//! Tables of what the program is worth: comparison with other programs' results.
+//! What the program is worth: comparison with other programs' results, and what accuracy costs in time.
 
 pub mod accuracy;
 pub mod verify;

@@ -7,8 +7,8 @@
 //! G(F) = G_0 + R_F Σ_FF⁻¹ R_Fᵀ
 //! ```
 //! G_0: all interface nodes constrained. R: displacement of candidates per bubble amplitude. Σ:
-//! stiffness of the bubbles on the elastic coarse part. A switch to another F needs one Cholesky of 3 n_f rows,
-//! made over [`BUILD_STEPS`] steps, and is then blended in,
+//! stiffness of the bubbles on the elastic coarse part. A switch to another F needs one Cholesky of
+//! 3 n_f rows, made over [`BUILD_STEPS`] steps or more, and is then blended in,
 //!
 //! ```text
 //! G = (1 - s) G(F_now) + s G(F_next),   s from 0 to 1
@@ -64,13 +64,13 @@ pub struct BubbleData {
 #[derive(Clone, Copy, Debug)]
 pub struct FreeSettings {
     rule: Rule,
-    /// Free nodes that memory is reserved for; the nearest are freed, the rest stays constrained.
+    /// Free nodes that memory is reserved for; beyond it nodes stay constrained.
     pub max_free: usize,
 }
 
-/// Free nodes at most: a factor of 1200 rows is 12 MB, and its columns fill the memory of a part
-/// that is large already. The nearest are freed.
-const MOST_FREE: usize = 400;
+/// Free nodes at most, unless more are asked for: a factor of 1200 rows is 12 MB, and its columns fill
+/// the memory of a part that is large already. A run that reaches it says so.
+pub const MOST_FREE: usize = 400;
 
 /// Near candidates that a time budget is reckoned with.
 const TYPICAL_ROWS: usize = 32;

@@ -1,6 +1,7 @@
 //! Settings, checks, troubles and notes of a run, in words.
 
 use super::Story;
+use crate::engine::MOST_FREE;
 use crate::prepare::budget::bytes;
 use crate::scene::ToolShape;
 use crate::session::Record;
@@ -196,6 +197,11 @@ impl Story<'_> {
                 most_free.unwrap_or(0),
                 switched.fold(0.0, f64::max),
             ));
+            if most_free == Some(MOST_FREE as u32) {
+                notes.push(format!(
+                    "No more than {MOST_FREE} interface nodes are free at a time; the choice asked for more."
+                ));
+            }
         }
         notes
     }

@@ -14,7 +14,7 @@
 
 use std::time::Instant;
 
-use contact::lcp::{Problem, Scratch, Settings, Solution, solve};
+use contact::lcp::{Problem, Scratch, Settings, Solution, Start, solve};
 use faer::{Mat, Par, Side};
 
 /// m, of a cell.
@@ -93,8 +93,16 @@ fn row(side: usize) {
     let mut scratch = Scratch::new(m);
     let (mut z, mut w) = (vec![0.0; m], vec![0.0; m]);
     let mut run = |q: &[f64], warm: Option<&[bool]>, z: &mut [f64]| -> Solution {
-        let problem = Problem::symmetric(&pressed.matrix, q).unwrap();
-        solve(&problem, &settings, &mut scratch, warm, z, &mut w).unwrap()
+        let problem = Problem::trusted_symmetric(&pressed.matrix, q).unwrap();
+        solve(
+            &problem,
+            &settings,
+            &mut scratch,
+            warm.map_or(Start::Cold, Start::Rows),
+            z,
+            &mut w,
+        )
+        .unwrap()
     };
     run(&before, None, &mut z);
     let warm: Vec<bool> = z.iter().map(|z| *z > 0.0).collect();

@@ -41,6 +41,20 @@ pub enum Error {
         /// Rows the scratch was made for.
         capacity: usize,
     },
+    /// A matrix that must be symmetric is not, by more than round-off.
+    #[error(
+        "matrix entry ({row}, {column}) is {value}, ({column}, {row}) is {mirrored}; the method needs a symmetric matrix"
+    )]
+    NotSymmetric {
+        /// Row of the entry, from 0.
+        row: usize,
+        /// Its column, from 0.
+        column: usize,
+        /// The entry.
+        value: f64,
+        /// Its mirror image.
+        mirrored: f64,
+    },
     /// A mesh file could not be read.
     #[error("{}: {cause}", path.display())]
     MeshFile {

@@ -4,18 +4,102 @@
 //! w = q + M z,   w ≥ 0,   z ≥ 0,   wᵀ z = 0
 //! ```
 //!
-//! For contact, `q` holds the gaps without contact force (m), `M` the Delassus operator (m/N),
-//! `z` the normal forces (N) and `w` the gaps (m).
+//! # The problem
 //!
-//! Way of a symmetric positive semi-definite problem: block principal pivoting from a warm start on
-//! M + E, E = 1e-12 diag(M); if its budget ends, single pivots that cannot cycle; then E is removed
-//! again by proximal steps on the true M, which leave round-off; if all that fails, projected
-//! Gauss-Seidel. Any other M: block pivoting while the diagonal is positive, then Lemke's method with
-//! the lexicographic rule.
-//! Each answer carries a [`Certificate`] made from the data as given.
+//! Two bodies may touch at m places. Before any contact force acts the gap at place i is q_i; where it is
+//! negative the bodies overlap. A force z_j that pushes at place j opens the gaps by column j of M. Three
+//! things must hold when all forces have settled (Signorini): no gap is negative (w ≥ 0), no force pulls
+//! (z ≥ 0), and a force acts only where the gap is closed (w_i z_i = 0). That is the linear complementarity
+//! problem, LCP. For contact, `q` and `w` are gaps (m), `M` the Delassus operator (m/N), `z` the normal forces (N).
 //!
-//! Source: Cottle, Pang, Stone, The Linear Complementarity Problem (1992); Júdice and Pires (1994) for
-//! block pivoting; Rockafellar (1976) for proximal steps.
+//! One place shows all of it. A spring of 1000 N/m stands 2 mm into a wall: M = 1e-3 m/N, q = -2e-3 m.
+//!
+//! ```
+//! use contact::lcp::{Problem, Scratch, Settings, Start, Status, solve};
+//!
+//! # fn main() -> Result<(), contact::Error> {
+//! let problem = Problem::symmetric(&[1e-3], &[-2e-3])?;
+//! let mut scratch = Scratch::new(1);
+//! let (mut z, mut w) = ([0.0_f64], [0.0]);
+//! let solution = solve(&problem, &Settings::default(), &mut scratch, Start::Cold, &mut z, &mut w)?;
+//! assert_eq!(solution.status, Status::Solved);
+//! assert!((z[0] - 2.0).abs() < 1e-12, "2 N close the gap");
+//! assert_eq!(w[0], 0.0);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! With m places there are 2^m ways to say which of them carry force, the *active* ones. If the active set is
+//! known the forces follow from one linear system, `M_FF z_F = -q_F`. All exact methods are ways to find the
+//! active set without trying all of them.
+//!
+//! # What an answer is worth
+//!
+//! Whatever the method, the answer carries a [`Certificate`], made from M, q and z alone; [`check`] makes it for
+//! the answer of any solver. A problem may have no solution (a tool wedged between rigid walls). That is a
+//! [`Status`] of its own and never a number.
+//!
+//! If M is symmetric positive definite, z is unique. If it is semidefinite (more contacts than the part has ways to
+//! give), w and M z are unique, and the solver returns one of the many z. Then M_FF has no inverse, and
+//! E = 1e-12 diag(M) is added while the active set is sought (1e-5 in `f32`). What that changes is known row by row: an
+//! answer of the changed problem misses the true one by w_i of 1e-12 M_ii z_i. Proximal steps on the true M
+//! then take it away again: z ← answer for q - E z. Where M_FF keeps its digits nothing is added at all.
+//!
+//! # Methods
+//!
+//! | method | for which M | ends | cost |
+//! | --- | --- | --- | --- |
+//! | [`BlockPivoting`] | positive principal minors (all positive definite) | always, by Murty's rule; 1 to 5 rounds on contact problems | one factorisation, then O(k m²) for k exchanged rows |
+//! | [`ActiveSet`] | symmetric positive semidefinite | always: its energy falls | O(m²) a pivot |
+//! | [`Lemke`] | any | with a solution or on a ray; a ray proves that there is none if M is copositive-plus | O(m²) a pivot |
+//! | [`GaussSeidel`] | symmetric positive semidefinite | in the limit | O(m²) a sweep |
+//!
+//! *Block principal pivoting* guesses an active set, solves for its forces, and then moves every active
+//! row with a pulling force out and every other row with a closed gap in, all at once. Contact
+//! problems are done after a few rounds. If the number of wrong rows stops falling only the last wrong row moves
+//! (Murty's rule). That ends on every matrix whose principal minors are positive, but perhaps after 2^m rounds: hence
+//! the budgets of [`Settings`]. *Active-set* pivoting moves one row at a time, downhill in energy, so that it cannot
+//! cycle even on singular M. *Lemke's method* walks along the edges of a polyhedron from a start that is easy; with the
+//! lexicographic rule it cannot cycle either. *Projected Gauss-Seidel* sets each row right in turn and starts over;
+//! it is never exact, but always has something to show.
+//!
+//! [`Automatic`], which is what [`solve`] runs, is a chain of them. Symmetric positive semi-definite M: block pivoting
+//! from a warm start; if its budget ends, single pivots; if all that fails, Gauss-Seidel and the best answer seen, flagged
+//! [`Status::Budget`]. Any other M: block pivoting while the diagonal is positive, then Lemke's method.
+//! Nothing allocates after [`Scratch::new`], and equal input gives equal bits (unless a deadline is set).
+//!
+//! # From step to step
+//!
+//! In a haptic loop the problem of this millisecond is nearly that of the last. [`Start::Rows`] hands over the rows that
+//! carried force, whatever happened to M. Where M itself stays, and only q changes, [`Start::Kept`] goes on
+//! from the factor that is there: k exchanged rows cost O(k m²).
+//!
+//! ```
+//! use contact::lcp::{Problem, Scratch, Settings, Start, solve};
+//!
+//! # fn main() -> Result<(), contact::Error> {
+//! // Two springs that lean on one another.
+//! let matrix = [2e-3, 1e-3, 1e-3, 2e-3];
+//! let (mut z, mut w) = ([0.0_f64; 2], [0.0; 2]);
+//! let mut scratch = Scratch::new(2);
+//! let settings = Settings::default();
+//! for step in 0..10 {
+//!     let depth = 1e-4 * f64::from(step);
+//!     let q = [-depth, 3e-4 - depth];
+//!     let problem = Problem::symmetric(&matrix, &q)?;
+//!     let start = if step == 0 { Start::Cold } else { Start::Kept };
+//!     let solution = solve(&problem, &settings, &mut scratch, start, &mut z, &mut w)?;
+//!     assert!(solution.certificate.natural_residual <= 1e-10);
+//!     assert!(z[0] * w[0] == 0.0 || w[0].abs() < 1e-18);
+//! }
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Sources: Cottle, Pang, Stone, The Linear Complementarity Problem (1992); Murty (1974) for the rule of
+//! the last row; Júdice and Pires (1994) for block pivoting; Lawson and Hanson (1974) for the active set;
+//! Lemke (1965); Rockafellar (1976) for proximal steps; Gill, Golub, Murray and Saunders (1974) for factors
+//! that change by a row.
 
 mod active_set;
 mod certificate;
@@ -27,41 +111,75 @@ mod lu;
 mod pivoting;
 mod problem;
 mod run;
+mod scalar;
 mod scaling;
+mod solver;
+
+use std::time::Instant;
 
 pub use certificate::{Certificate, check};
 pub use problem::Problem;
+pub use scalar::Scalar;
+pub use solver::{ActiveSet, Automatic, BlockPivoting, GaussSeidel, Lemke, Solver};
 
 use crate::error::Error;
 use pivoting::Basis;
-use run::Run;
 
-/// Budgets and tolerances of [`solve`]. There is no clock in here: equal input gives equal bits.
+/// Budgets and tolerances of a solve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// The natural residual ([`Certificate::natural_residual`]) up to which an answer counts as solved, no unit.
     /// 1e-10: a ten-billionth of the largest gap and force, far below what a device resolves. Round-off
     /// leaves about 1e-15 (1e-12 on very bad matrices).
     pub tolerance: f64,
-    /// Changes of the active set in block principal pivoting, each one factorisation of the active rows. Contact
-    /// problems need 0 to 3 from a warm start, 2 to 6 from none. 30 leaves room for the Murty steps.
+    /// Changes of the active set in block principal pivoting. Contact problems need 0 to 3 from a warm start,
+    /// 1 to 5 from none. 30 leaves room for the Murty steps.
     pub max_rounds: usize,
     /// Single pivots after that (active set or Lemke), each about m² operations. 5000 is enough
     /// for several hundred rows; lower it where time is short.
     pub max_pivots: usize,
     /// Gauss-Seidel sweeps after that, each about m times the rows that change. 500.
     pub max_sweeps: usize,
+    /// When to stop, whatever the other budgets say; looked at between two rounds, pivots or ten sweeps.
+    /// None: no clock is read, and equal input gives equal bits.
+    pub deadline: Option<Instant>,
+}
+
+impl Settings {
+    /// The defaults for numbers of type T: the tolerance is 1e-10 in `f64` and 1e-5 in `f32`.
+    pub fn of<T: Scalar>() -> Self {
+        Self {
+            tolerance: T::TOLERANCE,
+            max_rounds: 30,
+            max_pivots: 5000,
+            max_sweeps: 500,
+            deadline: None,
+        }
+    }
+
+    fn is_over(&self) -> bool {
+        self.deadline
+            .is_some_and(|deadline| Instant::now() >= deadline)
+    }
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self {
-            tolerance: 1e-10,
-            max_rounds: 30,
-            max_pivots: 5000,
-            max_sweeps: 500,
-        }
+        Self::of::<f64>()
     }
+}
+
+/// Where the search for the active rows starts. Any start gives the same answer where it is unique.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Start<'a> {
+    /// From the gaps: the rows deeper than half the deepest.
+    #[default]
+    Cold,
+    /// From these rows, one flag each: those with z > 0 in the step before, carried across by candidate.
+    Rows(&'a [bool]),
+    /// From rows and factor of the last solve with this scratch. M must be what it was then; if it is not, the certificate
+    /// finds out and the solve starts again, cold. For M that is not symmetric, or another m, the same as [`Start::Cold`].
+    Kept,
 }
 
 /// How a solve ended.
@@ -95,7 +213,7 @@ pub enum Method {
     GaussSeidel,
 }
 
-/// What [`solve`] says about the z and w it wrote.
+/// What a solve says about the z and w it wrote.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Solution {
     /// How it ended.
@@ -104,7 +222,7 @@ pub struct Solution {
     pub method: Method,
     /// How well z and w fit the problem as given.
     pub certificate: Certificate,
-    /// Active sets tried in block pivoting: 1 if the warm start was right, 0 if nothing was closed.
+    /// Active sets tried in block pivoting: 1 if the start was right, 0 if nothing was closed.
     pub rounds: usize,
     /// Rows exchanged, over all methods.
     pub pivots: usize,
@@ -112,34 +230,39 @@ pub struct Solution {
     pub sweeps: usize,
 }
 
-/// Memory of the solver, for up to `capacity` rows: 8 capacity² bytes and a little.
+/// Memory of the solvers, for up to `capacity` rows: 8 capacity² bytes (4 in `f32`) and a little.
 #[derive(Debug, Clone)]
-pub struct Scratch {
+pub struct Scratch<T: Scalar = f64> {
     capacity: usize,
     /// Factor or tableau, whichever is at work.
-    dense: Vec<f64>,
-    basis: Basis,
+    dense: Vec<T>,
+    ldl: ldl::LdlState<T>,
+    lu_rows: Vec<u32>,
+    basis: Basis<T>,
     /// Scaled size of each row, sqrt(M_ii).
-    scale: Vec<f64>,
-    unit: f64,
-    center: Vec<f64>,
-    best_z: Vec<f64>,
-    trial: Vec<f64>,
+    scale: Vec<T>,
+    unit: T,
+    center: Vec<T>,
+    best_z: Vec<T>,
+    trial: Vec<T>,
     integers: Vec<u32>,
 }
 
-impl Scratch {
+impl<T: Scalar> Scratch<T> {
     /// Memory for problems of up to `capacity` rows.
     pub fn new(capacity: usize) -> Self {
+        let n_dense = ldl::memory_len(capacity).max(lemke::tableau_len(capacity));
         Self {
             capacity,
-            dense: vec![0.0; lemke::tableau_len(capacity)],
+            dense: vec![T::zero(); n_dense],
+            ldl: ldl::LdlState::new(capacity),
+            lu_rows: Vec::with_capacity(capacity),
             basis: Basis::new(capacity),
-            scale: vec![0.0; capacity],
-            unit: 1.0,
-            center: vec![0.0; capacity],
-            best_z: vec![0.0; capacity],
-            trial: vec![0.0; capacity + 1],
+            scale: vec![T::zero(); capacity],
+            unit: T::one(),
+            center: vec![T::zero(); capacity],
+            best_z: vec![T::zero(); capacity],
+            trial: vec![T::zero(); capacity + 1],
             integers: vec![0; lemke::n_integers(capacity)],
         }
     }
@@ -150,58 +273,19 @@ impl Scratch {
     }
 }
 
-/// Solves `problem`, writes `z` and `w` = q + M z.
+/// Solves `problem` by [`Automatic`], writes `z` and `w` = q + M z.
 ///
-/// `warm`: rows expected to carry force (z > 0 of the step before, carried across by candidate).
-/// Any warm start gives the same answer where it is unique; a good one saves rounds.
-/// Does not allocate, lock, log or read a clock.
+/// Does not allocate, lock or log.
 ///
 /// # Errors
-/// [`Error::Capacity`], or [`Error::Length`] if `warm`, `z` or `w` do not have m entries.
-pub fn solve(
-    problem: &Problem,
+/// [`Error::Capacity`], or [`Error::Length`] if the start, `z` or `w` do not have m entries.
+pub fn solve<T: Scalar>(
+    problem: &Problem<T>,
     settings: &Settings,
-    scratch: &mut Scratch,
-    warm: Option<&[bool]>,
-    z: &mut [f64],
-    w: &mut [f64],
+    scratch: &mut Scratch<T>,
+    start: Start,
+    z: &mut [T],
+    w: &mut [T],
 ) -> Result<Solution, Error> {
-    let m = problem.m();
-    if m > scratch.capacity {
-        return Err(Error::Capacity {
-            rows: m,
-            capacity: scratch.capacity,
-        });
-    }
-    let lengths = [
-        ("z", z.len()),
-        ("w", w.len()),
-        ("the warm start", warm.map_or(m, <[bool]>::len)),
-    ];
-    for (what, actual) in lengths {
-        if actual != m {
-            return Err(Error::Length {
-                what,
-                expected: m,
-                actual,
-            });
-        }
-    }
-    let mut run = Run {
-        problem,
-        settings,
-        rounds: 0,
-        pivots: 0,
-        sweeps: 0,
-    };
-    let (status, method) = run.solve(scratch, warm, z, w);
-    let certificate = certificate::of(problem, z, w);
-    Ok(Solution {
-        status,
-        method,
-        certificate,
-        rounds: run.rounds,
-        pivots: run.pivots,
-        sweeps: run.sweeps,
-    })
+    Automatic.solve(problem, settings, scratch, start, z, w)
 }

@@ -9,7 +9,7 @@
 //! use contact::delassus::{ComplianceBlocks, delassus_into};
 //! use contact::glam::{DMat3, DVec3};
 //! use contact::glamx::DPose3;
-//! use contact::lcp::{Problem, Scratch, Settings, Status, solve};
+//! use contact::lcp::{Problem, Scratch, Settings, Start, Status, solve};
 //! use contact::plane::{planes_into, wrench_on_tool};
 //! use contact::proximity::NodeTree;
 //! use contact::tool::{Sphere, Tool};
@@ -43,7 +43,7 @@
 //! let problem = Problem::symmetric(&delassus, &gaps)?;
 //! let (mut forces, mut gaps_after) = (vec![0.0; m], vec![0.0; m]);
 //! let mut scratch = Scratch::new(m);
-//! let solution = solve(&problem, &Settings::default(), &mut scratch, None, &mut forces, &mut gaps_after)?;
+//! let solution = solve(&problem, &Settings::default(), &mut scratch, Start::Cold, &mut forces, &mut gaps_after)?;
 //! assert_eq!(solution.status, Status::Solved);
 //! assert!(solution.certificate.natural_residual < 1e-14);
 //!

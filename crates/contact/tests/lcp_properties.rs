@@ -2,7 +2,9 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
 use contact::Error;
-use contact::lcp::{Method, Problem, Scratch, Settings, Solution, Status, check, solve};
+use contact::lcp::{
+    GaussSeidel, Method, Problem, Scratch, Settings, Solution, Solver, Start, Status, check, solve,
+};
 use proptest::prelude::*;
 
 struct Answer {
@@ -27,12 +29,13 @@ fn answer(matrix: &[f64], q: &[f64], settings: &Settings, warm: Option<&[bool]>)
         &junk,
         settings,
         &mut scratch,
-        None,
+        Start::Cold,
         &mut junk_z,
         &mut junk_w,
     )
     .unwrap();
-    let solution = solve(&problem, settings, &mut scratch, warm, &mut z, &mut w).unwrap();
+    let start = warm.map_or(Start::Cold, Start::Rows);
+    let solution = solve(&problem, settings, &mut scratch, start, &mut z, &mut w).unwrap();
     // The solver's own certificate and the public check agree, whatever the outcome.
     let independent = check(&problem, &z).unwrap();
     let difference = independent.natural_residual - solution.certificate.natural_residual;
@@ -394,18 +397,26 @@ fn gauss_seidel_alone_converges_on_contact_like_problems() {
     let q: Vec<f64> = (0..m)
         .map(|i| 0.01 * ((i as f64 - 12.0).powi(2) - 30.0))
         .collect();
-    let settings = Settings {
-        max_rounds: 0,
-        max_pivots: 0,
-        ..Settings::default()
-    };
-    let swept = answer(&matrix, &q, &settings, None);
+    let (mut z, mut w) = (vec![0.0; m], vec![0.0; m]);
+    let problem = Problem::symmetric(&matrix, &q).unwrap();
+    let mut scratch = Scratch::new(m);
+    let settings = Settings::default();
+    let solution = GaussSeidel
+        .solve(
+            &problem,
+            &settings,
+            &mut scratch,
+            Start::Cold,
+            &mut z,
+            &mut w,
+        )
+        .unwrap();
     assert_eq!(
-        (swept.solution.status, swept.solution.method),
+        (solution.status, solution.method),
         (Status::Solved, Method::GaussSeidel)
     );
     let direct = cold(&matrix, &q);
-    for (a, b) in swept.z.iter().zip(&direct.z) {
+    for (a, b) in z.iter().zip(&direct.z) {
         assert!((a - b).abs() < 1e-9 * max_abs(&direct.z));
     }
 }
@@ -517,7 +528,7 @@ fn wrong_input_is_an_error_with_the_numbers() {
         &problem,
         &settings,
         &mut small,
-        None,
+        Start::Cold,
         &mut pair.0,
         &mut pair.1,
     );
@@ -533,7 +544,7 @@ fn wrong_input_is_an_error_with_the_numbers() {
         &problem,
         &settings,
         &mut scratch,
-        Some(&[true]),
+        Start::Rows(&[true]),
         &mut pair.0,
         &mut pair.1,
     );
@@ -550,7 +561,7 @@ fn wrong_input_is_an_error_with_the_numbers() {
             &problem,
             &settings,
             &mut scratch,
-            None,
+            Start::Cold,
             &mut [0.0],
             &mut pair.1
         )

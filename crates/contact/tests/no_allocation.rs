@@ -10,7 +10,7 @@ use std::cell::Cell;
 use contact::delassus::{ComplianceBlocks, CouplingCompliance, delassus_into};
 use contact::glam::{DMat3, DVec3};
 use contact::glamx::DPose3;
-use contact::lcp::{Problem, Scratch, Settings, solve};
+use contact::lcp::{Problem, Scratch, Settings, Start, solve};
 use contact::plane::planes_into;
 use contact::proximity::NodeTree;
 use contact::tool::{BoxShape, Capsule, Cylinder, HalfSpace, Mesh, Sphere, Tool};
@@ -83,7 +83,7 @@ fn solve_allocates_nothing_on_any_path() {
     ];
     for matrix in [&contact, &singular, &unsymmetric, &negative] {
         for settings in &all {
-            for warm in [None, Some(&warm[..])] {
+            for warm in [Start::Cold, Start::Rows(&warm), Start::Kept] {
                 let n = allocations(|| {
                     let problem = Problem::new(matrix, &q).unwrap();
                     solve(&problem, settings, &mut scratch, warm, &mut z, &mut w).unwrap();

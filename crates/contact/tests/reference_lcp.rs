@@ -6,7 +6,7 @@
 
 use std::path::{Path, PathBuf};
 
-use contact::lcp::{Problem, Scratch, Settings, Solution, Status, check, solve};
+use contact::lcp::{Problem, Scratch, Settings, Solution, Start, Status, check, solve};
 
 struct Case {
     name: String,
@@ -167,7 +167,7 @@ fn run_all(settings: &Settings, is_wanted: impl Fn(&Case) -> bool) {
                     &problem,
                     settings,
                     &mut scratch,
-                    Some(&warm),
+                    Start::Rows(&warm),
                     &mut z,
                     &mut w,
                 )
@@ -185,7 +185,15 @@ fn run_all(settings: &Settings, is_wanted: impl Fn(&Case) -> bool) {
             let problem = Problem::new(&matrix, &q).unwrap();
             let mut scratch = Scratch::new(q.len());
             let (mut z, mut w) = (vec![0.0; q.len()], vec![0.0; q.len()]);
-            let solution = solve(&problem, settings, &mut scratch, None, &mut z, &mut w).unwrap();
+            let solution = solve(
+                &problem,
+                settings,
+                &mut scratch,
+                Start::Cold,
+                &mut z,
+                &mut w,
+            )
+            .unwrap();
             let complaints = if case.json["outcome"] == "solution" {
                 let expected = case.array("z.npy");
                 complaints(&problem, &z, &w, &solution, &expected, case.is_z_compared())

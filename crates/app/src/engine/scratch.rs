@@ -143,13 +143,13 @@ impl Scratch {
             *warm = self.was_active[plane.candidate as usize];
         }
         let z = &mut self.z[..m];
-        let solution =
-            lcp::Problem::symmetric(&self.w_matrix[..m * m], &self.q[..m]).and_then(|problem| {
+        let solution = lcp::Problem::trusted_symmetric(&self.w_matrix[..m * m], &self.q[..m])
+            .and_then(|problem| {
                 lcp::solve(
                     &problem,
                     settings,
                     &mut self.lcp,
-                    Some(&self.warm[..m]),
+                    lcp::Start::Rows(&self.warm[..m]),
                     z,
                     &mut self.w[..m],
                 )

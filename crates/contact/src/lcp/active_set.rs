@@ -2,17 +2,19 @@
 //!
 //! Minimises ½ zᵀ M z + qᵀ z over z ≥ 0. Each step adds the row that overlaps most and walks
 //! towards the solution of the active rows, dropping rows whose force would change sign on the way.
-//! The energy falls with every step, so no active set comes back: it cannot cycle.
+//! The energy falls with every step, so no active set comes back: it cannot cycle. A step appends one row to the
+//! factor or takes one out, O(m²) operations.
 //!
 //! Source: Lawson and Hanson, Solving Least Squares Problems (1974), chapter 23.
 
 use super::pivoting::{End, Factor, Outcome, Work};
+use super::{Scalar, dense};
 
 /// Runs until no row is wrong. `held`: scratch of m. Leaves z ≥ 0.
-pub(super) fn solve(
-    work: &mut Work,
-    factor: &mut impl Factor,
-    held: &mut [f64],
+pub(super) fn solve<T: Scalar>(
+    work: &mut Work<T>,
+    factor: &mut impl Factor<T>,
+    held: &mut [T],
     max_pivots: usize,
 ) -> Outcome {
     let m = work.problem.m();
@@ -22,10 +24,14 @@ pub(super) fn solve(
         pivots: 0,
     };
     let mut refused = None;
-    held.fill(0.0);
+    held.fill(T::zero());
     work.basis.start_empty(m);
-    work.z.fill(0.0);
+    work.z.fill(T::zero());
     work.w.copy_from_slice(work.problem.q());
+    if factor.update(work.problem, work.basis.flags()).is_err() {
+        outcome.end = End::Singular;
+        return outcome;
+    }
     loop {
         let Some(entering) = most_overlapping_row(work, factor, refused) else {
             return outcome;
@@ -35,27 +41,25 @@ pub(super) fn solve(
         let mut is_first = true;
         // Each turn of this loop drops a row, the last one none.
         loop {
-            if outcome.pivots >= max_pivots {
+            if outcome.pivots >= max_pivots || work.settings.is_over() {
                 outcome.end = End::Budget;
                 work.z.copy_from_slice(held);
                 return outcome;
             }
-            work.basis.collect();
             if work.solve_active(factor).is_err() {
                 outcome.end = End::Singular;
                 return outcome;
             }
             // A new force that pulls contradicts its overlap: the overlap was round-off.
-            if is_first && work.z[entering] <= 0.0 {
+            if is_first && work.z[entering] <= T::zero() {
                 work.basis.exchange(entering);
-                work.basis.collect();
                 work.z.copy_from_slice(held);
-                super::dense::gaps_into(work.problem, work.z, work.w);
+                dense::gaps_into(work.problem, work.z, work.w);
                 refused = Some(entering);
                 break;
             }
             is_first = false;
-            let Some((leaving, step)) = first_to_leave(work, held) else {
+            let Some((leaving, step)) = first_to_leave(work, factor, held) else {
                 held.copy_from_slice(work.z);
                 refused = None;
                 break;
@@ -63,10 +67,10 @@ pub(super) fn solve(
             for (held, &z) in held.iter_mut().zip(work.z.iter()) {
                 *held += step * (z - *held);
             }
-            held[leaving] = 0.0;
+            held[leaving] = T::zero();
             for (row, held) in held.iter_mut().enumerate() {
-                if work.basis.is_active(row) && *held <= 0.0 {
-                    *held = 0.0;
+                if work.basis.is_active(row) && *held <= T::zero() {
+                    *held = T::zero();
                     work.basis.exchange(row);
                     outcome.pivots += 1;
                 }
@@ -75,13 +79,14 @@ pub(super) fn solve(
     }
 }
 
-fn most_overlapping_row(
-    work: &Work,
-    factor: &impl Factor,
+fn most_overlapping_row<T: Scalar>(
+    work: &Work<T>,
+    factor: &impl Factor<T>,
     refused: Option<usize>,
 ) -> Option<usize> {
-    let limits = work.limits(factor);
-    let mut most = (0.0, None);
+    let mut limits = work.limits();
+    work.forces_limit(&mut limits, factor);
+    let mut most = (T::zero(), None);
     for row in 0..work.problem.m() {
         if !work.basis.is_active(row) && work.may_be_active(row) && refused != Some(row) {
             let excess = work.excess(&limits, row);
@@ -94,12 +99,17 @@ fn most_overlapping_row(
 }
 
 /// The active row whose force reaches zero first on the way from `held` to z, and the part of the way.
-fn first_to_leave(work: &Work, held: &[f64]) -> Option<(usize, f64)> {
-    let mut first: Option<(usize, f64)> = None;
-    for &row in work.basis.rows() {
+fn first_to_leave<T: Scalar>(
+    work: &Work<T>,
+    factor: &impl Factor<T>,
+    held: &[T],
+) -> Option<(usize, T)> {
+    let mut first: Option<(usize, T)> = None;
+    for &row in factor.rows() {
         let row = row as usize;
-        if work.z[row] <= 0.0 {
-            let step = held[row] / (held[row] - work.z[row]).max(f64::MIN_POSITIVE);
+        if work.z[row] <= T::zero() {
+            let way = num_traits::Float::max(held[row] - work.z[row], T::min_positive_value());
+            let step = held[row] / way;
             if first.is_none_or(|(_, least)| step < least) {
                 first = Some((row, step));
             }

@@ -1,6 +1,6 @@
 //! How well z fits M and q, computed from these three alone.
 
-use super::{Problem, dense};
+use super::{Problem, Scalar, dense};
 use crate::error::Error;
 
 /// How well an answer fits the problem as given. All four numbers are 0 or round-off for a solution.
@@ -18,9 +18,11 @@ pub struct Certificate {
 
 /// The certificate of forces `z` for `w = q + M z`, made from nothing but the data: for checking any solver.
 ///
+/// Sums in f64 whatever the scalar is.
+///
 /// # Errors
 /// [`Error::Length`] if z does not have m entries.
-pub fn check(problem: &Problem, z: &[f64]) -> Result<Certificate, Error> {
+pub fn check<T: Scalar>(problem: &Problem<T>, z: &[T]) -> Result<Certificate, Error> {
     if z.len() != problem.m() {
         return Err(Error::Length {
             what: "z",
@@ -29,39 +31,44 @@ pub fn check(problem: &Problem, z: &[f64]) -> Result<Certificate, Error> {
         });
     }
     let mut judge = Judge::new(problem, z);
-    for i in 0..problem.m() {
-        let products = (0..problem.m()).map(|j| problem.column(j)[i] * z[j]);
-        judge.row(z[i], problem.q()[i] + products.sum::<f64>());
+    for (i, z_i) in z.iter().enumerate() {
+        let products = z.iter().enumerate();
+        let products = products.map(|(j, z)| problem.column(j)[i].wide() * z.wide());
+        judge.row(z_i.wide(), problem.q()[i].wide() + products.sum::<f64>());
     }
     Ok(judge.certificate)
 }
 
 /// As [`check`] where w = q + M z is already there.
-pub(super) fn of(problem: &Problem, z: &[f64], w: &[f64]) -> Certificate {
+pub(super) fn of<T: Scalar>(problem: &Problem<T>, z: &[T], w: &[T]) -> Certificate {
     let mut judge = Judge::new(problem, z);
-    for (&z, &w) in z.iter().zip(w) {
-        judge.row(z, w);
+    for (z, w) in z.iter().zip(w) {
+        judge.row(z.wide(), w.wide());
     }
     judge.certificate
 }
 
 struct Judge {
-    z_size: f64,
-    q_size: f64,
+    per_z: f64,
+    per_q: f64,
     certificate: Certificate,
 }
 
 impl Judge {
-    fn new(problem: &Problem, z: &[f64]) -> Self {
+    fn new<T: Scalar>(problem: &Problem<T>, z: &[T]) -> Self {
         // Where all is zero the ratio is zero as well, so any positive size serves.
-        let size = |values: &[f64]| {
-            let max = dense::max_abs(values);
-            if max > 0.0 { max } else { 1.0 }
+        let per_size = |values: &[T]| {
+            let max = dense::max_abs(values).wide();
+            if max > 0.0 {
+                1.0 / max.max(f64::MIN_POSITIVE)
+            } else {
+                1.0
+            }
         };
         let start = if problem.m() == 0 { 0.0 } else { f64::INFINITY };
         Self {
-            z_size: size(z),
-            q_size: size(problem.q()),
+            per_z: per_size(z),
+            per_q: per_size(problem.q()),
             certificate: Certificate {
                 min_z: start,
                 min_w: start,
@@ -72,16 +79,14 @@ impl Judge {
 
     fn row(&mut self, z: f64, w: f64) {
         let c = &mut self.certificate;
-        let (z_scaled, w_scaled) = (z / self.z_size, w / self.q_size);
-        let residual = z_scaled.min(w_scaled).abs();
+        let (z_scaled, w_scaled) = (z * self.per_z, w * self.per_q);
         // A NaN must not look like a solution.
-        if residual > c.natural_residual || residual.is_nan() || (z + w).is_nan() {
-            c.natural_residual = if (z + w).is_nan() {
-                f64::INFINITY
-            } else {
-                residual
-            };
-        }
+        let residual = if (z + w).is_nan() {
+            f64::INFINITY
+        } else {
+            z_scaled.min(w_scaled).abs()
+        };
+        c.natural_residual = c.natural_residual.max(residual);
         c.min_z = c.min_z.min(z);
         c.min_w = c.min_w.min(w);
         c.complementarity = c.complementarity.max((z_scaled * w_scaled).abs());
@@ -89,24 +94,26 @@ impl Judge {
 }
 
 /// Whether y proves that no z ≥ 0 gives w ≥ 0: y ≥ 0, Mᵀ y ≤ 0, qᵀ y < 0. Source: Farkas' lemma.
-pub(super) fn proves_no_solution(problem: &Problem, y: &[f64]) -> bool {
-    /// Of the sum of absolute terms: a thousand times above the regularisation of 1e-12, which bends y.
-    const TOLERANCE: f64 = 1e-9;
-    let weigh = |values: &[f64]| {
+///
+/// Signs are judged to 1e-9 of the sum of absolute terms (1e-4 in f32): a thousand times above the regularisation,
+/// which bends y.
+pub(super) fn proves_no_solution<T: Scalar>(problem: &Problem<T>, y: &[T]) -> bool {
+    let weigh = |values: &[T]| {
         values
             .iter()
             .zip(y)
-            .fold((0.0, 0.0), |(sum, size): (f64, f64), (&v, &y)| {
-                (sum + v * y, size + (v * y).abs())
+            .fold((0.0, 0.0), |(sum, size): (f64, f64), (v, y)| {
+                let term = v.wide() * y.wide();
+                (sum + term, size + term.abs())
             })
     };
     let (sum, size) = weigh(problem.q());
-    if !sum.is_finite() || sum >= -TOLERANCE * size || y.iter().any(|&y| y < 0.0) {
+    if !sum.is_finite() || sum >= -T::PROOF * size || y.iter().any(|&y| y < T::zero()) {
         return false;
     }
     (0..problem.m()).all(|j| {
         let (sum, size) = weigh(problem.column(j));
-        sum <= TOLERANCE * size
+        sum <= T::PROOF * size
     })
 }
 

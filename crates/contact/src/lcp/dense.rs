@@ -1,24 +1,19 @@
 //! The few dense loops that all methods share. Order of summation is fixed: equal input, equal bits.
 
-use super::Problem;
+use super::{Problem, Scalar};
 
 /// w = q + M z, column by column, skipping the zeros of z.
-pub(super) fn gaps_into(problem: &Problem, z: &[f64], w: &mut [f64]) {
+pub(super) fn gaps_into<T: Scalar>(problem: &Problem<T>, z: &[T], w: &mut [T]) {
     w.copy_from_slice(problem.q());
-    // Four columns at a time: one load and store of w for four products.
-    let mut columns = [(0.0, 0_usize); 4];
+    // Eight columns at a time: one load and store of w for eight products.
+    let mut columns = [(T::zero(), 0_usize); 8];
     let mut n = 0;
     for (j, &z) in z.iter().enumerate() {
-        if z != 0.0 {
+        if z != T::zero() {
             columns[n] = (z, j);
             n += 1;
-            if n == 4 {
-                let [(z0, a), (z1, b), (z2, c), (z3, d)] = columns;
-                let (a, b) = (problem.column(a), problem.column(b));
-                let (c, d) = (problem.column(c), problem.column(d));
-                for ((((w, a), b), c), d) in w.iter_mut().zip(a).zip(b).zip(c).zip(d) {
-                    *w += (a * z0 + b * z1) + (c * z2 + d * z3);
-                }
+            if n == 8 {
+                add_eight(problem, &columns, w);
                 n = 0;
             }
         }
@@ -28,35 +23,49 @@ pub(super) fn gaps_into(problem: &Problem, z: &[f64], w: &mut [f64]) {
     }
 }
 
+fn add_eight<T: Scalar>(problem: &Problem<T>, columns: &[(T, usize); 8], w: &mut [T]) {
+    let m = w.len();
+    let [a, b, c, d, e, f, g, h] = columns.map(|(_, j)| &problem.column(j)[..m]);
+    let z = columns.map(|(z, _)| z);
+    for (i, w) in w.iter_mut().enumerate() {
+        let left = (a[i] * z[0] + b[i] * z[1]) + (c[i] * z[2] + d[i] * z[3]);
+        let right = (e[i] * z[4] + f[i] * z[5]) + (g[i] * z[6] + h[i] * z[7]);
+        *w += left + right;
+    }
+}
+
 /// y += a x.
-pub(super) fn add_scaled(y: &mut [f64], a: f64, x: &[f64]) {
-    for (y, x) in y.iter_mut().zip(x) {
+pub(super) fn add_scaled<T: Scalar>(y: &mut [T], a: T, x: &[T]) {
+    for (y, &x) in y.iter_mut().zip(x) {
         *y += a * x;
     }
 }
 
 /// xᵀ y with eight partial sums, so that it is vectorised.
-pub(super) fn dot(x: &[f64], y: &[f64]) -> f64 {
+pub(super) fn dot<T: Scalar>(x: &[T], y: &[T]) -> T {
     let (x_chunks, x_rest) = x.as_chunks::<8>();
     let (y_chunks, y_rest) = y.as_chunks::<8>();
-    let mut sums = [0.0; 8];
+    let mut sums = [T::zero(); 8];
     for (x, y) in x_chunks.iter().zip(y_chunks) {
         for lane in 0..8 {
             sums[lane] += x[lane] * y[lane];
         }
     }
-    let rest: f64 = x_rest.iter().zip(y_rest).map(|(x, y)| x * y).sum();
+    let rest: T = x_rest.iter().zip(y_rest).map(|(&x, &y)| x * y).sum();
     let [a, b, c, d, e, f, g, h] = sums;
     ((a + e) + (b + f)) + ((c + g) + (d + h)) + rest
 }
 
 /// Largest absolute value, 0 for an empty slice.
-pub(super) fn max_abs(values: &[f64]) -> f64 {
-    values.iter().fold(0.0, |max: f64, x| max.max(x.abs()))
+pub(super) fn max_abs<T: Scalar>(values: &[T]) -> T {
+    values.iter().fold(T::zero(), |max, x| {
+        let x = num_traits::Float::abs(*x);
+        if x > max { x } else { max }
+    })
 }
 
 /// x ← L⁻¹ x for the leading `n` rows of a unit lower triangle, column-major with leading dimension `ld`.
-pub(super) fn solve_unit_lower(l: &[f64], ld: usize, n: usize, x: &mut [f64]) {
+pub(super) fn solve_unit_lower<T: Scalar>(l: &[T], ld: usize, n: usize, x: &mut [T]) {
     let x = &mut x[..n];
     let mut p = 0;
     // Four columns at a time: a small triangle, then their product with the rest.
@@ -74,7 +83,7 @@ pub(super) fn solve_unit_lower(l: &[f64], ld: usize, n: usize, x: &mut [f64]) {
             .zip(&b[rest..])
             .zip(&c[rest..])
             .zip(&d[rest..]);
-        for (x, (((a, b), c), d)) in x[rest..].iter_mut().zip(tails) {
+        for (x, (((&a, &b), &c), &d)) in x[rest..].iter_mut().zip(tails) {
             *x -= (a * x0 + b * x1) + (c * x2 + d * x3);
         }
         p = rest;
@@ -84,5 +93,13 @@ pub(super) fn solve_unit_lower(l: &[f64], ld: usize, n: usize, x: &mut [f64]) {
         for i in p + 1..n {
             x[i] -= l[p * ld + i] * x_p;
         }
+    }
+}
+
+/// x ← L⁻ᵀ x, as [`solve_unit_lower`].
+pub(super) fn solve_unit_lower_transposed<T: Scalar>(l: &[T], ld: usize, n: usize, x: &mut [T]) {
+    for p in (0..n).rev() {
+        let column = &l[p * ld..p * ld + n];
+        x[p] = x[p] - dot(&column[p + 1..], &x[p + 1..n]);
     }
 }

@@ -6,7 +6,7 @@
 //!
 //! Source: Cottle, Pang, Stone (1992), section 4.4 (method) and 4.9 (lexicographic rule).
 
-use super::Problem;
+use super::{Problem, Scalar, Settings, dense};
 
 /// Entries of the tableau for up to `capacity` rows: m x (m + 1) and its constant column.
 pub(super) fn tableau_len(capacity: usize) -> usize {
@@ -35,9 +35,16 @@ pub(super) struct Outcome {
     pub(super) pivots: usize,
 }
 
+/// Memory: a tableau of [`tableau_len`], [`n_integers`], and m + 1 numbers.
+pub(super) struct Memory<'a, T> {
+    pub(super) tableau: &'a mut [T],
+    pub(super) integers: &'a mut [u32],
+    pub(super) scale: &'a mut [T],
+}
+
 /// Where the path starts: the weights d of the artificial variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Start {
+pub(super) enum Weights {
     /// All rows alike.
     Even,
     /// Weights spread over three decades by the golden ratio. On matrices made to be exponential for even weights
@@ -45,44 +52,46 @@ pub(super) enum Start {
     Spread,
 }
 
-/// Solves from the artificial start. `scale`: scratch of m + 1. Writes z.
-pub(super) fn solve(
-    problem: &Problem,
-    start: Start,
+/// Solves from the artificial start. Writes z.
+pub(super) fn solve<T: Scalar>(
+    problem: &Problem<T>,
+    weights: Weights,
     max_pivots: usize,
-    memory: &mut [f64],
-    integers: &mut [u32],
-    scale: &mut [f64],
-    z: &mut [f64],
+    settings: &Settings,
+    memory: Memory<T>,
+    z: &mut [T],
 ) -> Outcome {
     let m = problem.m();
+    let scale = memory.scale;
     column_scale_into(problem, scale);
-    let mut tableau = Tableau::new(problem, start, memory, integers, scale);
-    let outcome = tableau.run(max_pivots);
+    let mut tableau = Tableau::new(problem, weights, memory.tableau, memory.integers, scale);
+    let outcome = tableau.run(max_pivots, settings);
     match outcome.end {
         End::Complementary => tableau.forces_into(z),
         End::Ray => tableau.ray_into(z),
-        End::Budget => z.fill(0.0),
+        End::Budget => z.fill(T::zero()),
     }
-    for (z, scale) in z.iter_mut().zip(&scale[..m]) {
+    for (z, &scale) in z.iter_mut().zip(&scale[..m]) {
         *z *= scale;
     }
     outcome
 }
 
 /// Powers of two near 1/sqrt of the row's size: the tableau is D M D with entries about 1, without round-off.
-fn column_scale_into(problem: &Problem, scale: &mut [f64]) {
+fn column_scale_into<T: Scalar>(problem: &Problem<T>, scale: &mut [T]) {
     let m = problem.m();
     for (i, scale) in scale[..m].iter_mut().enumerate() {
-        let mut size = problem.diagonal(i).abs();
+        let mut size = problem.diagonal(i).wide().abs();
         if size == 0.0 {
             size = (0..m).fold(0.0, |max: f64, j| {
-                max.max(problem.column(j)[i].abs())
-                    .max(problem.column(i)[j].abs())
+                max.max(problem.column(j)[i].wide().abs())
+                    .max(problem.column(i)[j].wide().abs())
             });
         }
         let exponent = if size > 0.0 { -0.5 * size.log2() } else { 0.0 };
-        *scale = exponent.round().clamp(-500.0, 500.0).exp2();
+        // Within the range of T, with room for the products.
+        let limit = -0.49 * T::min_positive_value().wide().log2();
+        *scale = T::of(exponent.round().clamp(-limit, limit).floor().exp2());
     }
 }
 
@@ -91,24 +100,24 @@ const GOLDEN_RATIO: f64 = 1.618_033_988_749_895;
 /// Each basic variable as an affine function of the others: x_B = b + T x_N.
 ///
 /// Variables: 0..m are w, m..2m are z, 2m is z_0.
-struct Tableau<'a> {
+struct Tableau<'a, T> {
     m: usize,
     /// T, column-major m x (m + 1).
-    t: &'a mut [f64],
-    b: &'a mut [f64],
+    t: &'a mut [T],
+    b: &'a mut [T],
     basic: &'a mut [u32],
     non_basic: &'a mut [u32],
     /// Row of a basic variable, m + column of another.
     place: &'a mut [u32],
 }
 
-impl<'a> Tableau<'a> {
+impl<'a, T: Scalar> Tableau<'a, T> {
     fn new(
-        problem: &Problem,
-        start: Start,
-        memory: &'a mut [f64],
+        problem: &Problem<T>,
+        weights: Weights,
+        memory: &'a mut [T],
         integers: &'a mut [u32],
-        scale: &[f64],
+        scale: &[T],
     ) -> Self {
         let m = problem.m();
         let (t, b) = memory.split_at_mut(m * (m + 1));
@@ -133,21 +142,21 @@ impl<'a> Tableau<'a> {
             tableau.b[j] = scale[j] * problem.q()[j];
         }
         // Weights as large as q, so that z_0 starts at about 1 and tolerances stay simple.
-        let size = super::dense::max_abs(tableau.b);
-        let size = if size > 0.0 { size } else { 1.0 };
+        let size = dense::max_abs(tableau.b);
+        let size = if size > T::zero() { size } else { T::one() };
         for i in 0..m {
-            let spread = match start {
-                Start::Even => 1.0,
-                Start::Spread => (10.0 * (GOLDEN_RATIO * (i + 1) as f64).fract()).exp2(),
+            let spread = match weights {
+                Weights::Even => 1.0,
+                Weights::Spread => (10.0 * (GOLDEN_RATIO * (i + 1) as f64).fract()).exp2(),
             };
-            tableau.t[m * m + i] = size * spread;
+            tableau.t[m * m + i] = size * T::of(spread);
         }
         tableau.non_basic[m] = (2 * m) as u32;
         tableau.place[2 * m] = (2 * m) as u32;
         tableau
     }
 
-    fn run(&mut self, max_pivots: usize) -> Outcome {
+    fn run(&mut self, max_pivots: usize, settings: &Settings) -> Outcome {
         let m = self.m;
         let artificial = (2 * m) as u32;
         // The most negative row makes room for z_0.
@@ -159,6 +168,12 @@ impl<'a> Tableau<'a> {
         };
         let mut column = m;
         for pivots in 1..=max_pivots {
+            if settings.is_over() {
+                return Outcome {
+                    end: End::Budget,
+                    pivots: pivots - 1,
+                };
+            }
             let leaving = self.basic[row];
             self.exchange(row, column);
             if leaving == artificial {
@@ -191,15 +206,13 @@ impl<'a> Tableau<'a> {
     /// The row that reaches zero first when the variable of `column` grows, lexicographically least of equals; for the
     /// first pivot the row that is most negative.
     fn leaving_row(&self, column: usize, is_first: bool) -> Option<usize> {
-        /// Of the largest entry of the column: smaller ones are round-off of a zero.
-        const ZERO: f64 = 1e-11;
-        /// Of the ratio: closer ones are equal.
-        const EQUAL: f64 = 1e-12;
         let m = self.m;
         let entries = &self.t[column * m..(column + 1) * m];
-        let threshold = ZERO * super::dense::max_abs(entries).max(f64::MIN_POSITIVE);
+        let largest = dense::max_abs(entries).wide();
+        let threshold = T::TABLEAU_ZERO * largest.max(f64::MIN_POSITIVE);
         let mut least: Option<(usize, f64)> = None;
-        for (row, (&b, &t)) in self.b.iter().zip(entries).enumerate() {
+        for (row, (b, t)) in self.b.iter().zip(entries).enumerate() {
+            let (b, t) = (b.wide(), t.wide());
             let ratio = if is_first {
                 if b >= 0.0 {
                     continue;
@@ -214,7 +227,8 @@ impl<'a> Tableau<'a> {
             let is_less = match least {
                 None => true,
                 Some((other, other_ratio)) => {
-                    let equal = EQUAL * ratio.abs().max(other_ratio.abs()) + f64::MIN_POSITIVE;
+                    let equal =
+                        T::TABLEAU_EQUAL * ratio.abs().max(other_ratio.abs()) + f64::MIN_POSITIVE;
                     if (ratio - other_ratio).abs() > equal {
                         ratio < other_ratio
                     } else {
@@ -237,12 +251,12 @@ impl<'a> Tableau<'a> {
         if self.basic[row] == artificial || self.basic[other] == artificial {
             return self.basic[row] == artificial;
         }
-        let weight = self.t[column * m + row].abs();
-        let other_weight = self.t[column * m + other].abs();
+        let weight = self.t[column * m + row].wide().abs();
+        let other_weight = self.t[column * m + other].wide().abs();
         for w in 0..m {
             let a = self.perturbation(row, w) / weight;
             let b = self.perturbation(other, w) / other_weight;
-            if (a - b).abs() > 1e-10 * a.abs().max(b.abs()) {
+            if (a - b).abs() > T::TOLERANCE * a.abs().max(b.abs()) {
                 return a < b;
             }
         }
@@ -255,7 +269,7 @@ impl<'a> Tableau<'a> {
         if place < self.m {
             if place == row { 1.0 } else { 0.0 }
         } else {
-            -self.t[(place - self.m) * self.m + row]
+            -self.t[(place - self.m) * self.m + row].wide()
         }
     }
 
@@ -269,52 +283,52 @@ impl<'a> Tableau<'a> {
                 continue;
             }
             let factor = -self.t[other * m + row] / pivot;
-            if factor != 0.0 {
+            if factor != T::zero() {
                 let (source, target) = two_columns(self.t, m, column, other);
-                super::dense::add_scaled(target, factor, source);
+                dense::add_scaled(target, factor, source);
             }
             self.t[other * m + row] = factor;
         }
         let step = -self.b[row] / pivot;
         let entries = &mut self.t[column * m..(column + 1) * m];
-        super::dense::add_scaled(self.b, step, entries);
+        dense::add_scaled(self.b, step, entries);
         self.b[row] = step;
         for entry in entries.iter_mut() {
             *entry /= pivot;
         }
-        entries[row] = 1.0 / pivot;
+        entries[row] = T::one() / pivot;
         std::mem::swap(&mut self.basic[row], &mut self.non_basic[column]);
         self.place[self.basic[row] as usize] = row as u32;
         self.place[self.non_basic[column] as usize] = (m + column) as u32;
     }
 
-    fn forces_into(&self, z: &mut [f64]) {
+    fn forces_into(&self, z: &mut [T]) {
         for (i, z) in z.iter_mut().enumerate() {
             let place = self.place[self.m + i] as usize;
             *z = if place < self.m {
-                self.b[place].max(0.0)
+                num_traits::Float::max(self.b[place], T::zero())
             } else {
-                0.0
+                T::zero()
             };
         }
     }
 
-    fn ray_into(&self, z: &mut [f64]) {
+    fn ray_into(&self, z: &mut [T]) {
         let column = self.place[2 * self.m] as usize;
         for (i, z) in z.iter_mut().enumerate() {
             let place = self.place[self.m + i] as usize;
             *z = if place < self.m {
-                self.t[column * self.m + place].max(0.0)
+                num_traits::Float::max(self.t[column * self.m + place], T::zero())
             } else if place - self.m == column {
-                1.0
+                T::one()
             } else {
-                0.0
+                T::zero()
             };
         }
     }
 }
 
-fn two_columns(t: &mut [f64], m: usize, source: usize, target: usize) -> (&[f64], &mut [f64]) {
+fn two_columns<T>(t: &mut [T], m: usize, source: usize, target: usize) -> (&[T], &mut [T]) {
     if source < target {
         let (left, right) = t.split_at_mut(target * m);
         (&left[source * m..(source + 1) * m], &mut right[..m])

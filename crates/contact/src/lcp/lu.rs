@@ -1,34 +1,44 @@
 //! L U of the active rows of an unsymmetric M, with row exchanges.
 
 use super::pivoting::{Factor, Singular};
-use super::{Problem, dense};
+use super::{Problem, Scalar, dense};
 
 /// `P M_FF = L U`, made anew for each active set.
-pub(super) struct Lu<'a> {
-    /// Column-major n x n: L below, U on and above the diagonal; then n row numbers, n of work.
-    memory: &'a mut [f64],
-    n: usize,
+pub(super) struct Lu<'a, T> {
+    /// Column-major n x n: L below, U on and above the diagonal; then n row numbers.
+    memory: &'a mut [T],
+    rows: &'a mut Vec<u32>,
 }
 
-impl<'a> Lu<'a> {
-    pub(super) fn new(memory: &'a mut [f64]) -> Self {
-        Self { memory, n: 0 }
+impl<'a, T: Scalar> Lu<'a, T> {
+    /// `rows`: room for all rows of the problem.
+    pub(super) fn new(memory: &'a mut [T], rows: &'a mut Vec<u32>) -> Self {
+        rows.clear();
+        Self { memory, rows }
     }
 }
 
-impl Factor for Lu<'_> {
-    const REGULARISATION: f64 = 0.0;
+impl<T: Scalar> Factor<T> for Lu<'_, T> {
+    fn regularisation(&self) -> f64 {
+        0.0
+    }
 
-    fn update(&mut self, problem: &Problem, rows: &[u32], _keep: usize) -> Result<(), Singular> {
-        let n = rows.len();
-        self.n = n;
+    fn rows(&self) -> &[u32] {
+        self.rows
+    }
+
+    fn update(&mut self, problem: &Problem<T>, is_active: &[bool]) -> Result<(), Singular> {
+        self.rows.clear();
+        let active = is_active.iter().enumerate().filter(|(_, is)| **is);
+        self.rows.extend(active.map(|(row, _)| row as u32));
+        let n = self.rows.len();
         let (factor, exchanges) = self.memory.split_at_mut(n * n);
         if n == 0 {
             return Ok(());
         }
-        for (target, &j) in factor.chunks_exact_mut(n).zip(rows) {
+        for (target, &j) in factor.chunks_exact_mut(n).zip(&*self.rows) {
             let column = problem.column(j as usize);
-            for (target, &i) in target.iter_mut().zip(rows) {
+            for (target, &i) in target.iter_mut().zip(&*self.rows) {
                 *target = column[i as usize];
             }
         }
@@ -42,10 +52,10 @@ impl Factor for Lu<'_> {
                 }
             }
             // An exact zero only: the certificate judges what a small pivot does.
-            if column[pivot] == 0.0 || !column[pivot].is_finite() {
+            if column[pivot] == T::zero() || !column[pivot].is_finite() {
                 return Err(Singular);
             }
-            exchanges[k] = pivot as f64;
+            exchanges[k] = T::of(pivot as f64);
             column.swap(k, pivot);
             let pivot_value = column[k];
             for l in &mut column[k + 1..] {
@@ -63,11 +73,11 @@ impl Factor for Lu<'_> {
         Ok(())
     }
 
-    fn solve(&mut self, x: &mut [f64]) {
-        let n = self.n;
+    fn solve(&mut self, x: &mut [T]) {
+        let n = self.rows.len();
         let (factor, exchanges) = self.memory.split_at(n * n);
-        for (k, &pivot) in exchanges[..n].iter().enumerate() {
-            x.swap(k, pivot as usize);
+        for (k, pivot) in exchanges[..n].iter().enumerate() {
+            x.swap(k, pivot.wide() as usize);
         }
         dense::solve_unit_lower(factor, n, n, x);
         for k in (0..n).rev() {

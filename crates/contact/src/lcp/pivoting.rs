@@ -5,64 +5,72 @@
 //!
 //! Source: Júdice and Pires (1994), Computers & Operations Research 21; Kim and Park (2011), SIAM J. Sci. Comput. 33.
 
-use super::{Problem, dense};
+use super::{Problem, Scalar, Settings, Start, dense};
 
 /// Rounds that may exchange all wrong rows without lowering their number. 3 as in the source.
 const PATIENCE: usize = 3;
 
-/// What counts as wrong, of the largest value, no unit: above the round-off of well-conditioned rows, a thousand
-/// times below the default tolerance of an answer.
-const WRONG: f64 = 1e-13;
+/// A cold start takes the rows deeper than this share of the deepest. ½ is where the contact of a smooth body ends
+/// (Hertz: a² = R d, while the bodies overlap up to 2 R d); blunter ones end deeper, a cone at 0.36.
+const COLD_START_DEPTH: f64 = 0.5;
 
 /// The active block has no inverse, or M is not what the method needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Singular;
 
 /// A factorisation of M over the active rows.
-pub(super) trait Factor {
+pub(super) trait Factor<T: Scalar> {
     /// E / diag(M), added before factorising.
-    const REGULARISATION: f64;
+    fn regularisation(&self) -> f64;
 
-    /// Factorises the block of `rows`; the first `keep` are those of the last call.
-    fn update(&mut self, problem: &Problem, rows: &[u32], keep: usize) -> Result<(), Singular>;
+    /// The rows of the factor, in its order.
+    fn rows(&self) -> &[u32];
 
-    /// x ← (M_FF + E)⁻¹ x.
-    fn solve(&mut self, x: &mut [f64]);
+    /// Makes it the factor of the active rows.
+    fn update(&mut self, problem: &Problem<T>, is_active: &[bool]) -> Result<(), Singular>;
+
+    /// x ← (M_FF + E)⁻¹ x, in the order of [`Factor::rows`].
+    fn solve(&mut self, x: &mut [T]);
 }
 
-/// The active rows, in the order in which they entered.
+/// The active rows.
 #[derive(Debug, Clone)]
-pub(super) struct Basis {
+pub(super) struct Basis<T> {
     is_active: Vec<bool>,
-    rows: Vec<u32>,
-    /// Leading rows that have not changed since the last factorisation.
-    keep: usize,
-    x: Vec<f64>,
+    wrong: Vec<u32>,
+    x: Vec<T>,
 }
 
-impl Basis {
+impl<T: Scalar> Basis<T> {
     pub(super) fn new(capacity: usize) -> Self {
         Self {
             is_active: Vec::with_capacity(capacity),
-            rows: Vec::with_capacity(capacity),
-            keep: 0,
-            x: vec![0.0; capacity],
+            wrong: Vec::with_capacity(capacity),
+            x: vec![T::zero(); capacity],
         }
     }
 
-    /// The rows of the warm start; without one the closed rows.
-    pub(super) fn start(&mut self, problem: &Problem, warm: Option<&[bool]>) {
-        match warm {
-            Some(warm) => self.start_from(problem.m(), |i| warm[i] && problem.diagonal(i) > 0.0),
-            None => self.start_from(problem.m(), |i| {
-                problem.q()[i] < 0.0 && problem.diagonal(i) > 0.0
-            }),
+    /// The rows of the warm start; without one the deep rows. `scale`: size of each row.
+    pub(super) fn start(&mut self, problem: &Problem<T>, start: Start, scale: &[T]) {
+        let has_diagonal = |row: usize| problem.diagonal(row) > T::zero();
+        match start {
+            Start::Cold => {
+                let depth = |row: usize| problem.q()[row] / scale[row];
+                let deepest = (0..problem.m())
+                    .map(depth)
+                    .fold(T::zero(), num_traits::Float::min);
+                let limit = T::of(COLD_START_DEPTH) * deepest;
+                self.start_from(problem.m(), |row| depth(row) < limit && has_diagonal(row));
+            }
+            Start::Rows(rows) => self.start_from(problem.m(), |i| rows[i] && has_diagonal(i)),
+            // The rows are those of the last solve.
+            Start::Kept => {}
         }
     }
 
     /// The rows with force.
-    pub(super) fn start_from_forces(&mut self, z: &[f64]) {
-        self.start_from(z.len(), |i| z[i] > 0.0);
+    pub(super) fn start_from_forces(&mut self, z: &[T]) {
+        self.start_from(z.len(), |i| z[i] > T::zero());
     }
 
     /// No rows.
@@ -73,44 +81,20 @@ impl Basis {
     fn start_from(&mut self, m: usize, is_active: impl Fn(usize) -> bool) {
         self.is_active.clear();
         self.is_active.extend((0..m).map(is_active));
-        // Nothing of an earlier problem may show in the order of rows.
-        self.rows.clear();
-        self.keep = 0;
-        self.collect();
+    }
+
+    /// Of each row, whether it is active.
+    pub(super) fn flags(&self) -> &[bool] {
+        &self.is_active
     }
 
     pub(super) fn is_active(&self, row: usize) -> bool {
         self.is_active[row]
     }
 
-    pub(super) fn rows(&self) -> &[u32] {
-        &self.rows
-    }
-
-    /// Exchanges one row; [`Basis::collect`] must follow before the next factorisation.
+    /// Takes a row in, or out.
     pub(super) fn exchange(&mut self, row: usize) {
         self.is_active[row] = !self.is_active[row];
-    }
-
-    /// Rows that stayed keep their order, new ones follow, so that the factorisation of the leading ones serves again.
-    pub(super) fn collect(&mut self) {
-        let is_active = &self.is_active;
-        let unchanged = self.rows.iter().take_while(|&&row| is_active[row as usize]);
-        self.keep = self.keep.min(unchanged.count());
-        self.rows.retain(|&row| is_active[row as usize]);
-        // Mark what is there already, by clearing and restoring its flag.
-        for &row in &self.rows {
-            self.is_active[row as usize] = false;
-        }
-        let n_kept = self.rows.len();
-        for row in 0..self.is_active.len() {
-            if self.is_active[row] {
-                self.rows.push(row as u32);
-            }
-        }
-        for &row in &self.rows[..n_kept] {
-            self.is_active[row as usize] = true;
-        }
     }
 }
 
@@ -136,22 +120,24 @@ pub(super) struct Outcome {
 }
 
 /// The problem `w = q - E center + (M + E) z` and its state.
-pub(super) struct Work<'a> {
-    pub(super) problem: &'a Problem<'a>,
-    pub(super) scale: &'a [f64],
+pub(super) struct Work<'a, T> {
+    pub(super) problem: &'a Problem<'a, T>,
+    pub(super) settings: &'a Settings,
+    pub(super) scale: &'a [T],
     /// Power of two: scale² unit = diag(M).
-    pub(super) unit: f64,
-    pub(super) center: &'a [f64],
-    pub(super) basis: &'a mut Basis,
-    pub(super) z: &'a mut [f64],
-    pub(super) w: &'a mut [f64],
+    pub(super) unit: T,
+    /// Forces from which a solve starts; None: zero.
+    pub(super) center: Option<&'a [T]>,
+    pub(super) basis: &'a mut Basis<T>,
+    pub(super) z: &'a mut [T],
+    pub(super) w: &'a mut [T],
 }
 
-impl Work<'_> {
+impl<T: Scalar> Work<'_, T> {
     /// Pivots until no row is wrong. Leaves z (active rows as solved, others 0) and w = q + M z.
     pub(super) fn block_pivoting(
         &mut self,
-        factor: &mut impl Factor,
+        factor: &mut impl Factor<T>,
         max_rounds: usize,
     ) -> Outcome {
         let mut outcome = Outcome {
@@ -161,118 +147,147 @@ impl Work<'_> {
         };
         let mut fewest = usize::MAX;
         let mut patience = PATIENCE;
+        let mut limits = self.limits();
         loop {
             if self.solve_active(factor).is_err() {
                 outcome.end = End::Singular;
                 return outcome;
             }
-            let limits = self.limits(factor);
-            let is_wrong = |work: &Self, row| work.excess(&limits, row) > 0.0;
-            let m = self.problem.m();
-            let n_wrong = (0..m).filter(|&row| is_wrong(self, row)).count();
+            self.forces_limit(&mut limits, factor);
+            self.find_wrong(&limits);
+            let n_wrong = self.basis.wrong.len();
             if n_wrong == 0 {
                 return outcome;
             }
-            if outcome.rounds == max_rounds {
+            if outcome.rounds == max_rounds || self.settings.is_over() {
                 outcome.end = End::Budget;
                 return outcome;
             }
-            let mut one_only = false;
+            let mut n_exchanged = n_wrong;
             if n_wrong < fewest {
                 fewest = n_wrong;
                 patience = PATIENCE;
             } else if patience > 0 {
                 patience -= 1;
             } else {
-                one_only = true;
+                n_exchanged = 1;
             }
-            for row in (0..m).rev() {
-                // An exchange does not change what is wrong with the other rows: z and w stay.
-                if is_wrong(self, row) && self.may_be_active(row) {
-                    self.basis.exchange(row);
-                    outcome.pivots += 1;
-                    if one_only {
-                        break;
-                    }
-                }
+            for position in n_wrong - n_exchanged..n_wrong {
+                let row = self.basis.wrong[position];
+                self.basis.exchange(row as usize);
             }
-            self.basis.collect();
+            outcome.pivots += n_exchanged;
             outcome.rounds += 1;
         }
     }
 
     /// z of the active rows from their zero gaps, then all gaps.
-    pub(super) fn solve_active(&mut self, factor: &mut impl Factor) -> Result<(), Singular> {
+    pub(super) fn solve_active(&mut self, factor: &mut impl Factor<T>) -> Result<(), Singular> {
         let basis = &mut *self.basis;
-        factor.update(self.problem, &basis.rows, basis.keep)?;
-        basis.keep = basis.rows.len();
+        factor.update(self.problem, &basis.is_active)?;
+        let x = &mut basis.x[..factor.rows().len()];
         // Forces of the active rows start from the centre; what is missing follows from the gaps left.
-        for row in 0..self.problem.m() {
-            self.z[row] = if basis.is_active[row] {
-                self.center[row]
-            } else {
-                0.0
-            };
-        }
-        dense::gaps_into(self.problem, self.z, self.w);
-        let x = &mut basis.x[..basis.rows.len()];
-        for (x, &row) in x.iter_mut().zip(&basis.rows) {
-            *x = -self.w[row as usize];
+        let gaps = if let Some(center) = self.center {
+            for ((z, &center), &is_active) in self.z.iter_mut().zip(center).zip(&basis.is_active) {
+                *z = if is_active { center } else { T::zero() };
+            }
+            dense::gaps_into(self.problem, self.z, self.w);
+            &*self.w
+        } else {
+            self.z.fill(T::zero());
+            self.problem.q()
+        };
+        for (x, &row) in x.iter_mut().zip(factor.rows()) {
+            *x = -gaps[row as usize];
         }
         factor.solve(x);
-        for (x, &row) in x.iter().zip(&basis.rows) {
-            self.z[row as usize] += x;
+        for (x, &row) in x.iter().zip(factor.rows()) {
+            self.z[row as usize] += *x;
         }
         dense::gaps_into(self.problem, self.z, self.w);
         Ok(())
     }
 
-    /// From where on a force or a gap is wrong, for the forces as they are.
-    pub(super) fn limits<F: Factor>(&self, _factor: &F) -> Limits {
-        let mut limits = Limits {
-            regularisation: F::REGULARISATION,
-            ..Limits::default()
-        };
-        let mut z_sum = 0.0;
-        for (row, &scale) in self.scale.iter().enumerate() {
-            let z = (self.z[row] * scale).abs();
-            z_sum += z;
-            limits.z = limits.z.max(z);
-            limits.w_scaled = limits.w_scaled.max((self.problem.q()[row] / scale).abs());
-            limits.w = limits.w.max(self.problem.q()[row].abs());
+    /// From where on a force or a gap is wrong, but for what depends on the forces.
+    pub(super) fn limits(&self) -> Limits<T> {
+        let mut limits = Limits::default();
+        for (&q, &scale) in self.problem.q().iter().zip(self.scale) {
+            let q = num_traits::Float::abs(q);
+            limits.w = num_traits::Float::max(limits.w, q);
+            limits.w_scaled = num_traits::Float::max(limits.w_scaled, q / scale);
         }
-        limits.z *= WRONG;
-        limits.w_scaled *= WRONG;
-        limits.w *= WRONG;
-        // w_i is a sum of terms up to sqrt(M_ii M_jj) z_j.
-        limits.w_round_off = 8.0 * f64::EPSILON * z_sum * self.unit;
+        limits.w *= T::of(T::WRONG);
+        limits.w_scaled *= T::of(T::WRONG);
         limits
     }
 
+    /// The rest of [`Work::limits`], for the forces as they are.
+    pub(super) fn forces_limit(&self, limits: &mut Limits<T>, factor: &impl Factor<T>) {
+        let (mut z_max, mut z_sum) = (T::zero(), T::zero());
+        for &row in factor.rows() {
+            let z = num_traits::Float::abs(self.z[row as usize] * self.scale[row as usize]);
+            z_sum += z;
+            z_max = num_traits::Float::max(z_max, z);
+        }
+        limits.regularisation = T::of(factor.regularisation());
+        limits.z = T::of(T::WRONG) * z_max;
+        // w_i is a sum of terms up to sqrt(M_ii M_jj) z_j.
+        limits.w_round_off = T::of(8.0) * T::epsilon() * z_sum * self.unit;
+    }
+
+    fn find_wrong(&mut self, limits: &Limits<T>) {
+        let mut wrong = std::mem::take(&mut self.basis.wrong);
+        wrong.clear();
+        for row in 0..self.problem.m() {
+            if self.excess(limits, row) > T::zero() && self.may_be_active(row) {
+                wrong.push(row as u32);
+            }
+        }
+        self.basis.wrong = wrong;
+    }
+
     /// By how much a row is wrong, scaled; not positive for a right one.
-    pub(super) fn excess(&self, limits: &Limits, row: usize) -> f64 {
+    pub(super) fn excess(&self, limits: &Limits<T>, row: usize) -> T {
         let scale = self.scale[row];
         if self.basis.is_active[row] {
-            -self.z[row] * scale - limits.z
-        } else {
-            let regularisation = limits.regularisation * self.problem.diagonal(row);
-            let gap = self.w[row] - regularisation * self.center[row];
-            -gap / scale - limits.w_scaled.min(limits.w / scale) - limits.w_round_off
+            return -self.z[row] * scale - limits.z;
         }
+        let mut gap = self.w[row];
+        if let Some(center) = self.center {
+            gap -= limits.regularisation * self.problem.diagonal(row) * center[row];
+        }
+        if gap > T::zero() {
+            // Right, and no division.
+            return -gap;
+        }
+        let allowed = num_traits::Float::min(limits.w_scaled, limits.w / scale);
+        -gap / scale - allowed - limits.w_round_off
     }
 
     /// Rows without stiffness of their own never carry force.
     pub(super) fn may_be_active(&self, row: usize) -> bool {
-        self.problem.diagonal(row) > 0.0
+        self.problem.diagonal(row) > T::zero()
     }
 }
 
 /// Tolerances of one state, see [`Work::limits`].
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Limits {
-    regularisation: f64,
-    z: f64,
-    w: f64,
-    w_scaled: f64,
-    w_round_off: f64,
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Limits<T> {
+    regularisation: T,
+    z: T,
+    w: T,
+    w_scaled: T,
+    w_round_off: T,
+}
+
+impl<T: Scalar> Default for Limits<T> {
+    fn default() -> Self {
+        Self {
+            regularisation: T::zero(),
+            z: T::zero(),
+            w: T::zero(),
+            w_scaled: T::zero(),
+            w_round_off: T::zero(),
+        }
+    }
 }

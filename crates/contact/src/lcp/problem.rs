@@ -1,35 +1,48 @@
 //! The data of a complementarity problem, checked once.
 
+use super::Scalar;
 use crate::error::Error;
 
 /// A complementarity problem, borrowed: column-major `matrix` (m x m) and `q` (m).
 #[derive(Debug, Clone, Copy)]
-pub struct Problem<'a> {
+pub struct Problem<'a, T = f64> {
     m: usize,
-    matrix: &'a [f64],
-    q: &'a [f64],
+    matrix: &'a [T],
+    q: &'a [T],
     is_symmetric: bool,
 }
 
-impl<'a> Problem<'a> {
-    /// Checks the data and finds out whether M is symmetric (to 1e-10 of the diagonal).
+impl<'a, T: Scalar> Problem<'a, T> {
+    /// Any M: checks the data and finds out whether M is symmetric (to 1e-10 of the diagonal, 1e-5 in f32).
     ///
     /// Does not allocate. Cost: two passes over M.
     ///
     /// # Errors
     /// [`Error::Length`] unless M is square of the size of q; [`Error::NotFinite`].
-    pub fn new(matrix: &'a [f64], q: &'a [f64]) -> Result<Self, Error> {
-        let mut problem = Self::symmetric(matrix, q)?;
-        problem.is_symmetric = is_symmetric(problem.m, matrix);
+    pub fn new(matrix: &'a [T], q: &'a [T]) -> Result<Self, Error> {
+        let mut problem = Self::trusted_symmetric(matrix, q)?;
+        problem.is_symmetric = problem.skew_entry().is_none();
         Ok(problem)
     }
 
-    /// As [`Problem::new`] for an M that the caller made symmetric, as [`crate::delassus`] does: saves the
-    /// slower of the two passes.
+    /// An M that must be symmetric, as that of frictionless contact is.
+    ///
+    /// # Errors
+    /// As [`Problem::new`], and [`Error::NotSymmetric`] with the first pair of entries that differ by more than round-off.
+    pub fn symmetric(matrix: &'a [T], q: &'a [T]) -> Result<Self, Error> {
+        let problem = Self::trusted_symmetric(matrix, q)?;
+        match problem.skew_entry() {
+            None => Ok(problem),
+            Some((row, column)) => Err(problem.not_symmetric(row, column)),
+        }
+    }
+
+    /// As [`Problem::symmetric`] for an M that the caller made symmetric, as [`crate::delassus`] does:
+    /// saves the slower of the two passes. If M is not symmetric after all, the certificate says so.
     ///
     /// # Errors
     /// As [`Problem::new`].
-    pub fn symmetric(matrix: &'a [f64], q: &'a [f64]) -> Result<Self, Error> {
+    pub fn trusted_symmetric(matrix: &'a [T], q: &'a [T]) -> Result<Self, Error> {
         let m = q.len();
         if matrix.len() != m * m {
             return Err(Error::Length {
@@ -54,12 +67,12 @@ impl<'a> Problem<'a> {
     }
 
     /// M, column-major.
-    pub fn matrix(&self) -> &'a [f64] {
+    pub fn matrix(&self) -> &'a [T] {
         self.matrix
     }
 
     /// q.
-    pub fn q(&self) -> &'a [f64] {
+    pub fn q(&self) -> &'a [T] {
         self.q
     }
 
@@ -68,20 +81,55 @@ impl<'a> Problem<'a> {
         self.is_symmetric
     }
 
-    pub(super) fn column(&self, j: usize) -> &'a [f64] {
+    pub(super) fn column(&self, j: usize) -> &'a [T] {
         &self.matrix[j * self.m..(j + 1) * self.m]
     }
 
-    pub(super) fn diagonal(&self, i: usize) -> f64 {
+    pub(super) fn diagonal(&self, i: usize) -> T {
         self.matrix[i * self.m + i]
+    }
+
+    /// For methods that need symmetry.
+    pub(super) fn require_symmetric(&self) -> Result<(), Error> {
+        if self.is_symmetric {
+            return Ok(());
+        }
+        let (row, column) = self.skew_entry().unwrap_or_default();
+        Err(self.not_symmetric(row, column))
+    }
+
+    fn not_symmetric(&self, row: usize, column: usize) -> Error {
+        Error::NotSymmetric {
+            row,
+            column,
+            value: self.column(column)[row].wide(),
+            mirrored: self.column(row)[column].wide(),
+        }
+    }
+
+    /// The first entry below the diagonal, column by column, that differs from its mirror image.
+    fn skew_entry(&self) -> Option<(usize, usize)> {
+        (0..self.m).find_map(|column| {
+            let rows = column + 1..self.m;
+            let mut skew = rows.filter(|&row| self.is_skew(row, column));
+            skew.next().map(|row| (row, column))
+        })
+    }
+
+    fn is_skew(&self, row: usize, column: usize) -> bool {
+        let difference = self.column(column)[row].wide() - self.column(row)[column].wide();
+        let size = (self.diagonal(row).wide() * self.diagonal(column).wide()).abs();
+        // T's default tolerance: above the round-off of a computed compliance, far below any true skewness.
+        difference * difference > T::TOLERANCE * T::TOLERANCE * size
     }
 }
 
-fn check_finite(what: &'static str, values: &[f64]) -> Result<(), Error> {
+fn check_finite<T: Scalar>(what: &'static str, values: &[T]) -> Result<(), Error> {
     // Whole chunks without an early exit, so that the loop is vectorised.
     for (chunk_idx, chunk) in values.chunks(64).enumerate() {
-        if !chunk.iter().fold(true, |ok, x| ok & x.is_finite()) {
-            let inside = chunk.iter().position(|x| !x.is_finite()).unwrap_or(0);
+        let is_finite = |x: &T| num_traits::Float::is_finite(*x);
+        if !chunk.iter().fold(true, |ok, x| ok & is_finite(x)) {
+            let inside = chunk.iter().position(|x| !is_finite(x)).unwrap_or(0);
             return Err(Error::NotFinite {
                 what,
                 index: chunk_idx * 64 + inside,
@@ -89,16 +137,4 @@ fn check_finite(what: &'static str, values: &[f64]) -> Result<(), Error> {
         }
     }
     Ok(())
-}
-
-fn is_symmetric(m: usize, matrix: &[f64]) -> bool {
-    /// Of sqrt(M_ii M_jj): above the round-off of a computed compliance, far below any true skewness.
-    const TOLERANCE: f64 = 1e-10;
-    (0..m).all(|j| {
-        (0..j).all(|i| {
-            let difference = matrix[j * m + i] - matrix[i * m + j];
-            let size = (matrix[i * m + i] * matrix[j * m + j]).abs();
-            difference * difference <= TOLERANCE * TOLERANCE * size
-        })
-    })
 }

@@ -1,12 +1,12 @@
 //! Sizes of the rows, so that tolerances mean the same in every row and in every unit system.
 
-use super::Problem;
+use super::{Problem, Scalar};
 
 /// What the diagonal says about M.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Diagonal {
+pub(super) struct Diagonal<T> {
     /// The power of two below the largest M_ii: scale_i² unit = M_ii.
-    pub(super) unit: f64,
+    pub(super) unit: T,
     /// All M_ii > 0.
     pub(super) is_positive_diagonal: bool,
     /// All M_ii ≥ 0 and rows with M_ii = 0 are zero: necessary for symmetric positive semi-definite M.
@@ -18,36 +18,48 @@ pub(super) struct Diagonal {
 /// With D = diag(scale)⁻¹ the matrix D M D has a unit diagonal (up to 2^e), w_i / scale_i and z_i scale_i
 /// compare between rows. The matrix itself is not copied: its factorisation uses no square roots,
 /// so that scaling by powers of two would not change a bit of it.
-pub(super) fn row_scale_into(problem: &Problem, scale: &mut [f64]) -> Diagonal {
+pub(super) fn row_scale_into<T: Scalar>(problem: &Problem<T>, scale: &mut [T]) -> Diagonal<T> {
     let m = problem.m();
-    let largest = (0..m).fold(0.0_f64, |max, i| max.max(problem.diagonal(i)));
+    let scale = &mut scale[..m];
+    let mut largest = T::zero();
+    let mut is_positive_diagonal = true;
+    for (i, scale) in scale.iter_mut().enumerate() {
+        let diagonal = problem.diagonal(i);
+        *scale = diagonal;
+        is_positive_diagonal &= diagonal > T::zero();
+        largest = num_traits::Float::max(largest, diagonal);
+    }
     let unit = power_of_two_below(largest);
     let mut kind = Diagonal {
         unit,
-        is_positive_diagonal: true,
+        is_positive_diagonal,
         is_semidefinite_diagonal: true,
     };
-    for (i, scale) in scale[..m].iter_mut().enumerate() {
-        let diagonal = problem.diagonal(i);
-        if diagonal > 0.0 {
-            *scale = (diagonal / unit).sqrt();
-        } else {
-            *scale = 1.0;
-            kind.is_positive_diagonal = false;
-            if diagonal < 0.0 || problem.column(i).iter().any(|&entry| entry != 0.0) {
-                kind.is_semidefinite_diagonal = false;
+    if !is_positive_diagonal {
+        for (i, scale) in scale.iter_mut().enumerate() {
+            if *scale <= T::zero() {
+                let is_zero_row = || problem.column(i).iter().all(|&entry| entry == T::zero());
+                kind.is_semidefinite_diagonal &= *scale == T::zero() && is_zero_row();
+                *scale = unit;
             }
         }
+    }
+    // Exact, as the unit is a power of two.
+    let per_unit = T::one() / unit;
+    for scale in scale.iter_mut() {
+        *scale = num_traits::Float::sqrt(*scale * per_unit);
     }
     kind
 }
 
 /// Largest 2^e ≤ x, so that x / 2^e is exact and in [1, 2). 1 for x = 0.
-fn power_of_two_below(x: f64) -> f64 {
-    if x < f64::MIN_POSITIVE {
-        return 1.0;
+fn power_of_two_below<T: Scalar>(x: T) -> T {
+    // Where 1 / 2^e would not be a normal number any more, 1 serves as well.
+    let range = T::min_positive_value()..=T::one() / T::min_positive_value();
+    if !range.contains(&x) {
+        return T::one();
     }
-    f64::from_bits(x.to_bits() & (0x7ff << 52))
+    T::of(f64::from_bits(x.wide().to_bits() & (0x7ff << 52)))
 }
 
 #[cfg(test)]
@@ -81,5 +93,15 @@ mod tests {
         assert_eq!(kind([1.0, 0.0, 0.0, 0.0]), (false, true));
         assert_eq!(kind([1.0, 0.5, 0.5, 0.0]), (false, false));
         assert_eq!(kind([1.0, 0.0, 0.0, -1.0]), (false, false));
+    }
+
+    #[test]
+    fn sizes_at_the_ends_of_the_range_stay_finite() {
+        for size in [1e-310, 1e-300, 1e300, f64::MAX] {
+            let matrix = [size];
+            let mut scale = [0.0];
+            row_scale_into(&Problem::new(&matrix, &[-1.0]).unwrap(), &mut scale);
+            assert!(scale[0].is_finite() && scale[0] > 0.0, "{size}");
+        }
     }
 }

@@ -370,7 +370,7 @@ fn rest_problem(ready: &Touchable, pose: &DPose3, expected: &Value) -> Result<Va
         &problem,
         &lcp::Settings::default(),
         &mut lcp::Scratch::new(m),
-        None,
+        lcp::Start::Cold,
         &mut z,
         &mut w,
     )

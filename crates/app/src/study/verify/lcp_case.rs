@@ -38,7 +38,7 @@ struct Answer {
 fn solve(
     matrix: &[f64],
     q: &[f64],
-    warm: Option<&[bool]>,
+    start: lcp::Start,
     scratch: &mut lcp::Scratch,
 ) -> Result<Answer, Failure> {
     let m = q.len();
@@ -49,7 +49,7 @@ fn solve(
         &problem,
         &lcp::Settings::default(),
         scratch,
-        warm,
+        start,
         &mut z,
         &mut w,
     )
@@ -67,7 +67,12 @@ fn solve(
 
 fn run_one(dir: &Path, problem: &Value) -> Outcome {
     let (matrix, q) = (read_matrix(dir, "M.npy")?, read(dir, "q.npy")?);
-    let answer = solve(&matrix, &q, None, &mut lcp::Scratch::new(q.len()))?;
+    let answer = solve(
+        &matrix,
+        &q,
+        lcp::Start::Cold,
+        &mut lcp::Scratch::new(q.len()),
+    )?;
     let outcome = if answer.solved {
         "solution"
     } else if answer.no_solution {
@@ -139,7 +144,12 @@ fn run_sequence(dir: &Path, problem: &Value) -> Outcome {
         }
         // The set of rows changes from step to step: the warm start is carried by id.
         let warm: Vec<bool> = ids.iter().map(|id| active.contains(id)).collect();
-        let answer = solve(&matrix, &q, Some(&warm), &mut lcp::Scratch::new(q.len()))?;
+        let answer = solve(
+            &matrix,
+            &q,
+            lcp::Start::Rows(&warm),
+            &mut lcp::Scratch::new(q.len()),
+        )?;
         worst = if answer.solved {
             worst.max(answer.certificate)
         } else {

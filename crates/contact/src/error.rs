@@ -41,6 +41,16 @@ pub enum Error {
         /// Rows the scratch was made for.
         capacity: usize,
     },
+    /// A friction coefficient is negative or not finite.
+    #[error(
+        "the friction coefficient of contact {contact} is {value}, it must be finite and not below 0"
+    )]
+    NegativeFriction {
+        /// Contact, from 0.
+        contact: usize,
+        /// Its coefficient.
+        value: f64,
+    },
     /// A matrix that must be symmetric is not, by more than round-off.
     #[error(
         "matrix entry ({row}, {column}) is {value}, ({column}, {row}) is {mirrored}; the method needs a symmetric matrix"

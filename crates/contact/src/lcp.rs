@@ -118,6 +118,7 @@ mod solver;
 use std::time::Instant;
 
 pub use certificate::{Certificate, check};
+pub(crate) use dense::gaps_into;
 pub use problem::Problem;
 pub use scalar::Scalar;
 pub use solver::{ActiveSet, Automatic, BlockPivoting, GaussSeidel, Lemke, Solver};

@@ -2,7 +2,7 @@
 //!
 //! The way of the data: a [`proximity::NodeTree`] finds the candidate nodes near a [`tool::Tool`]; each gets
 //! a [`plane::Plane`]; the caller's compliance blocks become the Delassus operator in [`delassus`]; [`lcp`] finds
-//! the normal forces and certifies them; [`plane::wrench_on_tool`] sums them up. Everything is in the part's frame
+//! the normal forces and certifies them, [`friction`] the tangential ones where a scene calls for them; [`plane::wrench_on_tool`] sums them up. Everything is in the part's frame
 //! and in SI units. This crate knows no finite elements.
 //!
 //! ```
@@ -56,6 +56,7 @@
 
 pub mod delassus;
 mod error;
+pub mod friction;
 pub mod lcp;
 pub mod plane;
 pub mod proximity;

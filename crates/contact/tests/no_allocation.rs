@@ -8,6 +8,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use contact::delassus::{ComplianceBlocks, CouplingCompliance, delassus_into};
+use contact::friction;
 use contact::glam::{DMat3, DVec3};
 use contact::glamx::DPose3;
 use contact::lcp::{Problem, Scratch, Settings, Start, solve};
@@ -90,6 +91,40 @@ fn solve_allocates_nothing_on_any_path() {
                 });
                 assert_eq!(n, 0);
             }
+        }
+    }
+}
+
+#[test]
+fn friction_allocates_nothing() {
+    let n = 12;
+    let w: Vec<f64> = (0..9 * n * n)
+        .map(|k| {
+            let (i, j) = (k / (3 * n), k % (3 * n));
+            let near = (-((i / 3) as f64 - (j / 3) as f64).abs() / 2.0).exp();
+            if i % 3 == j % 3 { near } else { 0.05 * near }
+        })
+        .collect();
+    let q: Vec<f64> = (0..3 * n).map(|i| ((i * 7) % 5) as f64 - 2.5).collect();
+    let mut scratch = friction::Scratch::new(n);
+    let (mut forces, mut slip) = (vec![0.0; 3 * n], vec![0.0; 3 * n]);
+    for coefficient in [0.0, 0.2, 3.0] {
+        let mu = vec![coefficient; n];
+        for is_warm in [false, true] {
+            let n_allocations = allocations(|| {
+                let problem = friction::Problem::new(&w, &q, &mu).unwrap();
+                let settings = friction::Settings::default();
+                friction::solve(
+                    &problem,
+                    &settings,
+                    &mut scratch,
+                    is_warm,
+                    &mut forces,
+                    &mut slip,
+                )
+                .unwrap();
+            });
+            assert_eq!(n_allocations, 0, "μ = {coefficient}");
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::{Problem, Scalar};
 
 /// w = q + M z, column by column, skipping the zeros of z.
-pub(super) fn gaps_into<T: Scalar>(problem: &Problem<T>, z: &[T], w: &mut [T]) {
+pub(crate) fn gaps_into<T: Scalar>(problem: &Problem<T>, z: &[T], w: &mut [T]) {
     w.copy_from_slice(problem.q());
     // Eight columns at a time: one load and store of w for eight products.
     let mut columns = [(T::zero(), 0_usize); 8];
@@ -100,6 +100,7 @@ pub(super) fn solve_unit_lower<T: Scalar>(l: &[T], ld: usize, n: usize, x: &mut 
 pub(super) fn solve_unit_lower_transposed<T: Scalar>(l: &[T], ld: usize, n: usize, x: &mut [T]) {
     for p in (0..n).rev() {
         let column = &l[p * ld..p * ld + n];
-        x[p] = x[p] - dot(&column[p + 1..], &x[p + 1..n]);
+        let below = dot(&column[p + 1..], &x[p + 1..n]);
+        x[p] -= below;
     }
 }

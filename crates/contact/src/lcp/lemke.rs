@@ -210,6 +210,7 @@ impl<'a, T: Scalar> Tableau<'a, T> {
         let entries = &self.t[column * m..(column + 1) * m];
         let largest = dense::max_abs(entries).wide();
         let threshold = T::TABLEAU_ZERO * largest.max(f64::MIN_POSITIVE);
+        let round_off = 16.0 * T::epsilon().wide() * dense::max_abs(self.b).wide();
         let mut least: Option<(usize, f64)> = None;
         for (row, (b, t)) in self.b.iter().zip(entries).enumerate() {
             let (b, t) = (b.wide(), t.wide());
@@ -227,8 +228,11 @@ impl<'a, T: Scalar> Tableau<'a, T> {
             let is_less = match least {
                 None => true,
                 Some((other, other_ratio)) => {
-                    let equal =
-                        T::TABLEAU_EQUAL * ratio.abs().max(other_ratio.abs()) + f64::MIN_POSITIVE;
+                    // A constant that should be zero is round-off of the largest one.
+                    let other_weight = entries[other].wide().abs();
+                    let noise = round_off * (1.0 / t.abs() + 1.0 / other_weight);
+                    let equal = T::TABLEAU_EQUAL * ratio.abs().max(other_ratio.abs());
+                    let equal = equal.max(noise) + f64::MIN_POSITIVE;
                     if (ratio - other_ratio).abs() > equal {
                         ratio < other_ratio
                     } else {

@@ -3,6 +3,7 @@
 use super::run::{self, Request};
 use super::{Solution, Start};
 use crate::error::Error;
+use crate::friction;
 
 /// A number the solvers work in: `f64` or `f32`.
 ///
@@ -14,7 +15,7 @@ impl Scalar for f64 {}
 impl Scalar for f32 {}
 
 pub(super) mod sealed {
-    use super::{Error, Request, Solution, Start};
+    use super::{Error, Request, Solution, Start, friction};
 
     /// What [`super::Scalar`] promises inside this crate.
     pub trait Number:
@@ -39,6 +40,8 @@ pub(super) mod sealed {
         const TABLEAU_ZERO: f64;
         /// Of a ratio in Lemke's method: closer ones are equal.
         const TABLEAU_EQUAL: f64;
+        /// [`friction::Settings::tolerance`] unless set.
+        const FRICTION_TOLERANCE: f64;
         /// Of the sum of absolute terms in a proof that there is no solution.
         const PROOF: f64;
 
@@ -53,6 +56,17 @@ pub(super) mod sealed {
         ) -> Result<Solution, Error>
         where
             Self: super::Scalar;
+        /// [`friction::solve`], likewise.
+        fn solve_friction(
+            problem: &friction::Problem<Self>,
+            settings: &friction::Settings,
+            scratch: &mut friction::Scratch<Self>,
+            is_warm: bool,
+            forces: &mut [Self],
+            slip: &mut [Self],
+        ) -> Result<friction::Solution, Error>
+        where
+            Self: super::Scalar;
     }
 }
 
@@ -65,6 +79,7 @@ impl sealed::Number for f64 {
     const TOLERANCE: f64 = 1e-10;
     const TABLEAU_ZERO: f64 = 1e-11;
     const TABLEAU_EQUAL: f64 = 1e-12;
+    const FRICTION_TOLERANCE: f64 = 1e-8;
     const PROOF: f64 = 1e-9;
 
     fn of(value: f64) -> Self {
@@ -81,6 +96,16 @@ impl sealed::Number for f64 {
     ) -> Result<Solution, Error> {
         run::solve(request, start, z, w)
     }
+    fn solve_friction(
+        problem: &friction::Problem<Self>,
+        settings: &friction::Settings,
+        scratch: &mut friction::Scratch<Self>,
+        is_warm: bool,
+        forces: &mut [Self],
+        slip: &mut [Self],
+    ) -> Result<friction::Solution, Error> {
+        friction::run(problem, settings, scratch, is_warm, forces, slip)
+    }
 }
 
 impl sealed::Number for f32 {
@@ -92,6 +117,7 @@ impl sealed::Number for f32 {
     const TOLERANCE: f64 = 1e-5;
     const TABLEAU_ZERO: f64 = 1e-5;
     const TABLEAU_EQUAL: f64 = 1e-6;
+    const FRICTION_TOLERANCE: f64 = 1e-4;
     const PROOF: f64 = 1e-4;
 
     fn of(value: f64) -> Self {
@@ -107,5 +133,15 @@ impl sealed::Number for f32 {
         w: &mut [Self],
     ) -> Result<Solution, Error> {
         run::solve(request, start, z, w)
+    }
+    fn solve_friction(
+        problem: &friction::Problem<Self>,
+        settings: &friction::Settings,
+        scratch: &mut friction::Scratch<Self>,
+        is_warm: bool,
+        forces: &mut [Self],
+        slip: &mut [Self],
+    ) -> Result<friction::Solution, Error> {
+        friction::run(problem, settings, scratch, is_warm, forces, slip)
     }
 }

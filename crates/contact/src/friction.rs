@@ -1,0 +1,203 @@
+//! Coulomb friction: normal and tangential forces of all contacts at once, with the exact disk.
+//!
+//! Contact i has a normal and two tangents, and in that order three rows in
+//!
+//! ```text
+//! u = q + W λ
+//! ```
+//!
+//! u_n is the gap (m), u_t the slip in this step (m), λ the force on the part (N), W the Delassus operator over
+//! normals and tangents (m/N). Three things must hold (Signorini, Coulomb):
+//!
+//! ```text
+//! u_n ≥ 0,  λ_n ≥ 0,  u_n λ_n = 0        no overlap, no pull
+//! |λ_t| ≤ μ λ_n                           the force is inside the cone
+//! u_t = -s λ_t,  s ≥ 0,  s (μ λ_n - |λ_t|) = 0   where the point slips, the force opposes it in full
+//! ```
+//!
+//! With ũ = u + μ |u_t| n this is one line, λ ∈ K, ũ ∈ K*, λᵀ ũ = 0 (de Saxcé), and one number says how far
+//! λ is from it: the natural residual |λ - P(λ - ũ)| of the [`Certificate`], P the projection on the cone K.
+//!
+//! # Method
+//!
+//! From the frictionless answer: sweeps over the contacts, each solved exactly for its three forces while the others
+//! stand still (non-smooth Gauss-Seidel), then Newton steps on all closed contacts together. Newton ends in a few
+//! steps once the sweeps have found who sticks and who slips; a step that does not lower the residual is not taken, and the
+//! sweeps go on. For one contact there are three cases: open; stick, if the force that stops all motion is inside
+//! the cone; else slip, where the direction of slip is a root of a trigonometric polynomial of degree two, found to
+//! round-off. With all coefficients zero the answer is that of [`crate::lcp`] and nothing else is computed.
+//!
+//! The answer is unique for small coefficients. For large ones there may be none, or several, as when a part wedges: then
+//! the answer is the best seen and [`Status::Budget`] says so.
+//!
+//! ```
+//! use contact::friction::{Problem, Scratch, Settings, State, Status, solve};
+//!
+//! # fn main() -> Result<(), contact::Error> {
+//! // A spring of 1000 N/m in each direction, 1 mm into a wall that slides 5 mm along it, friction coefficient 0.5.
+//! let matrix = [1e-3, 0.0, 0.0, 0.0, 1e-3, 0.0, 0.0, 0.0, 1e-3];
+//! let problem = Problem::new(&matrix, &[-1e-3, 5e-3, 0.0], &[0.5])?;
+//! let mut scratch = Scratch::new(1);
+//! let (mut forces, mut slip) = ([0.0; 3], [0.0; 3]);
+//! let solution = solve(&problem, &Settings::default(), &mut scratch, false, &mut forces, &mut slip)?;
+//! assert_eq!(solution.status, Status::Solved);
+//! assert_eq!(scratch.states(), [State::Slip]);
+//! // 1 N holds the gap closed, half a newton drags against the slip, the rest of the way is slip.
+//! assert!((forces[0] - 1.0_f64).abs() < 1e-12 && (forces[1] + 0.5_f64).abs() < 1e-12);
+//! assert!((slip[1] - 4.5e-3_f64).abs() < 1e-15);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Sources: Jean (1999), CMAME 177, for the sweeps; de Saxcé and Feng (1998), Math. Comput. Model. 28; Alart and
+//! Curnier (1991), CMAME 92, for Newton's method; Bonnefon and Daviet (2011), INRIA RR-7528, for the degree of
+//! the slip equation.
+
+mod certificate;
+mod cone;
+mod local;
+mod newton;
+mod problem;
+mod run;
+
+use std::time::Instant;
+
+pub use certificate::{Certificate, check};
+pub use problem::Problem;
+pub(crate) use run::run;
+
+use crate::error::Error;
+use crate::lcp::{self, Scalar};
+
+/// Budgets and tolerances of [`solve`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// The natural residual ([`Certificate::natural_residual`]) up to which an answer counts as solved, no unit.
+    /// 1e-8 in `f64`; Newton's method usually ends far below.
+    pub tolerance: f64,
+    /// Sweeps over the contacts, each about 9 n² operations for n contacts. 200.
+    pub max_sweeps: usize,
+    /// Newton steps, each a factorisation of the closed contacts' rows. 20; 0 leaves the sweeps alone.
+    pub max_newton_steps: usize,
+    /// When to stop, whatever the other budgets say. None: no clock is read, and equal input gives equal bits.
+    pub deadline: Option<Instant>,
+}
+
+impl Settings {
+    /// The defaults for numbers of type T: the tolerance is 1e-8 in `f64` and 1e-4 in `f32`.
+    pub fn of<T: Scalar>() -> Self {
+        Self {
+            // A slip direction has half the digits where slip is about to start.
+            tolerance: T::FRICTION_TOLERANCE,
+            max_sweeps: 200,
+            max_newton_steps: 20,
+            deadline: None,
+        }
+    }
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self::of::<f64>()
+    }
+}
+
+/// How a solve ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// The forces solve the problem; the certificate says how well.
+    Solved,
+    /// The budget ended, or there is no solution. The forces are the best seen, the certificate says how good.
+    Budget,
+}
+
+/// What a contact does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum State {
+    /// No force.
+    #[default]
+    Open,
+    /// Closed, the force inside the cone.
+    Stick,
+    /// Closed, the force on the cone.
+    Slip,
+}
+
+/// What [`solve`] says about the forces it wrote.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Solution {
+    /// How it ended.
+    pub status: Status,
+    /// How well the forces fit the problem as given.
+    pub certificate: Certificate,
+    /// Sweeps over the contacts.
+    pub sweeps: usize,
+    /// Newton steps taken.
+    pub newton_steps: usize,
+}
+
+/// Memory of the solver, for up to `capacity` contacts: about 90 capacity² numbers.
+#[derive(Debug, Clone)]
+pub struct Scratch<T: Scalar = f64> {
+    capacity: usize,
+    lcp: lcp::Scratch<T>,
+    normal_matrix: Vec<T>,
+    normal_q: Vec<T>,
+    normal_force: Vec<T>,
+    normal_gap: Vec<T>,
+    states: Vec<State>,
+    /// Slip direction of each contact, where the next local solve starts.
+    directions: Vec<[T; 2]>,
+    best: Vec<T>,
+    swept: Vec<T>,
+    newton: newton::Scratch<T>,
+}
+
+impl<T: Scalar> Scratch<T> {
+    /// Memory for problems of up to `capacity` contacts.
+    pub fn new(capacity: usize) -> Self {
+        Self {
+            capacity,
+            lcp: lcp::Scratch::new(capacity),
+            normal_matrix: vec![T::zero(); capacity * capacity],
+            normal_q: vec![T::zero(); capacity],
+            normal_force: vec![T::zero(); capacity],
+            normal_gap: vec![T::zero(); capacity],
+            states: Vec::with_capacity(capacity),
+            directions: Vec::with_capacity(capacity),
+            best: vec![T::zero(); 3 * capacity],
+            swept: vec![T::zero(); 3 * capacity],
+            newton: newton::Scratch::new(3 * capacity),
+        }
+    }
+
+    /// Largest number of contacts.
+    pub fn capacity(&self) -> usize {
+        self.capacity
+    }
+
+    /// What each contact does in the answer of the last solve.
+    pub fn states(&self) -> &[State] {
+        &self.states
+    }
+}
+
+/// Solves `problem`; writes the forces (three per contact: normal, tangents; N) and the gaps and slips they leave,
+/// u = q + W λ (m).
+///
+/// `is_warm`: start from what stands in `forces` instead of from the frictionless answer.
+/// Does not allocate, lock or log.
+///
+/// # Errors
+/// [`Error::Capacity`], or [`Error::Length`] if `forces` or `slip` do not have three entries per contact, or
+/// [`Error::NotFinite`] if a force to start from is not finite.
+pub fn solve<T: Scalar>(
+    problem: &Problem<T>,
+    settings: &Settings,
+    scratch: &mut Scratch<T>,
+    is_warm: bool,
+    forces: &mut [T],
+    slip: &mut [T],
+) -> Result<Solution, Error> {
+    T::solve_friction(problem, settings, scratch, is_warm, forces, slip)
+}

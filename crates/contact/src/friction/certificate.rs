@@ -1,0 +1,112 @@
+//! How well forces fit the conditions of Signorini and Coulomb, from the data alone.
+
+use super::{Problem, cone};
+use crate::error::Error;
+use crate::lcp::Scalar;
+
+/// How well an answer fits the problem as given. For a solution all numbers but the gaps are 0 or round-off.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Certificate {
+    /// Largest over the contacts of `|λ - P(λ - ũ)|`, forces by the largest force and ũ by the largest |q|, no unit:
+    /// one number for all conditions. Without friction it is that of [`crate::lcp::Certificate`].
+    pub natural_residual: f64,
+    /// Smallest normal force, N; below 0 a contact pulls.
+    pub min_normal_force: f64,
+    /// Smallest gap, m; below 0 the bodies overlap.
+    pub min_gap: f64,
+    /// Largest |λ_t| - μ λ_n, N; above 0 a force is outside its cone.
+    pub max_cone_excess: f64,
+    /// Largest λ_tᵀ u_t, J; above 0 friction drives instead of braking.
+    pub max_friction_work: f64,
+}
+
+/// The certificate of `forces`, made from nothing but the data: for checking any solver. Sums in f64.
+///
+/// # Errors
+/// [`Error::Length`] unless there are three forces per contact.
+pub fn check<T: Scalar>(problem: &Problem<T>, forces: &[T]) -> Result<Certificate, Error> {
+    problem.check_length("the forces", forces.len())?;
+    let n_rows = problem.q().len();
+    let mut judge = Judge::new(problem, forces);
+    for contact in 0..problem.n_contacts() {
+        let row = 3 * contact;
+        let mut u = [0.0; 3];
+        for (axis, u) in u.iter_mut().enumerate() {
+            let products =
+                (0..n_rows).map(|j| problem.column(j)[row + axis].wide() * forces[j].wide());
+            *u = problem.q()[row + axis].wide() + products.sum::<f64>();
+        }
+        let force = [forces[row], forces[row + 1], forces[row + 2]].map(|f| f.wide());
+        judge.contact(problem.friction_coefficients()[contact].wide(), force, u);
+    }
+    Ok(judge.certificate)
+}
+
+/// As [`check`] where u = q + W λ is already there.
+pub(super) fn of<T: Scalar>(problem: &Problem<T>, forces: &[T], u: &[T]) -> Certificate {
+    let mut judge = Judge::new(problem, forces);
+    let triples = forces.as_chunks::<3>().0.iter().zip(u.as_chunks::<3>().0);
+    for ((force, u), mu) in triples.zip(problem.friction_coefficients()) {
+        judge.contact(mu.wide(), force.map(|f| f.wide()), u.map(|u| u.wide()));
+    }
+    judge.certificate
+}
+
+struct Judge {
+    per_force: f64,
+    per_q: f64,
+    certificate: Certificate,
+}
+
+impl Judge {
+    fn new<T: Scalar>(problem: &Problem<T>, forces: &[T]) -> Self {
+        let per_size = |values: &[T]| {
+            let max = values
+                .iter()
+                .fold(0.0, |max: f64, x| max.max(x.wide().abs()));
+            if max > 0.0 {
+                1.0 / max.max(f64::MIN_POSITIVE)
+            } else {
+                1.0
+            }
+        };
+        let start = if problem.n_contacts() == 0 {
+            0.0
+        } else {
+            f64::INFINITY
+        };
+        Self {
+            per_force: per_size(forces),
+            per_q: per_size(problem.q()),
+            certificate: Certificate {
+                min_normal_force: start,
+                min_gap: start,
+                max_cone_excess: -start,
+                max_friction_work: -start,
+                ..Certificate::default()
+            },
+        }
+    }
+
+    fn contact(&mut self, mu: f64, force: [f64; 3], u: [f64; 3]) {
+        let c = &mut self.certificate;
+        let scaled = force.map(|f| f * self.per_force);
+        let raised = [u[0] + mu * u[1].hypot(u[2]), u[1], u[2]].map(|u| u * self.per_q);
+        let trial = [0, 1, 2].map(|k| scaled[k] - raised[k]);
+        let nearest = cone::project(&trial, mu);
+        let distances = [0, 1, 2].map(|k| (scaled[k] - nearest[k]).abs());
+        // A NaN must not look like a solution.
+        let residual = if distances.iter().any(|d| d.is_nan()) {
+            f64::INFINITY
+        } else {
+            distances.iter().fold(0.0, |max: f64, d| max.max(*d))
+        };
+        c.natural_residual = c.natural_residual.max(residual);
+        c.min_normal_force = c.min_normal_force.min(force[0]);
+        c.min_gap = c.min_gap.min(u[0]);
+        c.max_cone_excess = c
+            .max_cone_excess
+            .max(cone::tangential(&force) - mu * force[0]);
+        c.max_friction_work = c.max_friction_work.max(force[1] * u[1] + force[2] * u[2]);
+    }
+}

@@ -186,10 +186,10 @@ proptest! {
     /// The answer is unique, so every method and every warm start must find it.
     #[test]
     fn positive_definite_has_the_answer_of_exhaustive_search(
-        m in 1..=10_usize,
-        entries in numbers(120),
-        q in numbers(10),
-        warm in prop::collection::vec(any::<bool>(), 10),
+        m in 1..=12_usize,
+        entries in numbers(168),
+        q in numbers(12),
+        warm in prop::collection::vec(any::<bool>(), 12),
     ) {
         let mut matrix = gram(m, m + 2, &entries);
         add_to_diagonal(&mut matrix, m, 0.05);

@@ -224,3 +224,38 @@ fn reference_problems_without_block_pivoting_have_the_known_answers() {
         case.json["family"] != "exponential" || case.json["symmetric"] == true
     });
 }
+
+#[test]
+fn reference_problems_in_f32_are_solved_to_1e_5() {
+    let mut wrong = Vec::new();
+    let single = |values: Vec<f64>| values.iter().map(|x| *x as f32).collect::<Vec<f32>>();
+    for case in cases().iter().filter(|case| case.json["steps"].is_null()) {
+        let q = case.array("q.npy");
+        let matrix = single(case.matrix("M.npy", q.len()));
+        let q = single(q);
+        let problem = Problem::new(&matrix, &q).unwrap();
+        let mut scratch = Scratch::new(q.len());
+        let (mut z, mut w) = (vec![0.0_f32; q.len()], vec![0.0_f32; q.len()]);
+        let settings = Settings::of::<f32>();
+        let solution = solve(
+            &problem,
+            &settings,
+            &mut scratch,
+            Start::Cold,
+            &mut z,
+            &mut w,
+        )
+        .unwrap();
+        let expected = if case.json["outcome"] == "solution" {
+            Status::Solved
+        } else {
+            Status::NoSolution
+        };
+        let residual = check(&problem, &z).unwrap().natural_residual;
+        let is_good = expected == Status::NoSolution || residual <= 1e-5;
+        if solution.status != expected || !is_good {
+            wrong.push(format!("{}: {solution:?}, {residual:e}", case.name));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}

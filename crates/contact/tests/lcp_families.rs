@@ -1,0 +1,583 @@
+//! Hard families of problems, each by every method that is made for it, and against an independent QP solver.
+#![allow(clippy::unwrap_used, reason = "a test may stop")]
+
+use clarabel::algebra::CscMatrix;
+use clarabel::solver::{
+    DefaultSettingsBuilder, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus,
+};
+use contact::Error;
+use contact::lcp::{
+    ActiveSet, Automatic, BlockPivoting, GaussSeidel, Lemke, Problem, Scalar, Scratch, Settings,
+    Solution, Solver, Start, Status, check, solve,
+};
+
+/// The same numbers on every run.
+struct Numbers(u64);
+
+impl Numbers {
+    /// From -1 to 1.
+    fn next(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+
+    fn take(&mut self, n: usize) -> Vec<f64> {
+        (0..n).map(|_| self.next()).collect()
+    }
+
+    /// A Aᵀ of rank at most `rank`, exactly symmetric.
+    fn gram(&mut self, m: usize, rank: usize) -> Vec<f64> {
+        let a = self.take(m * rank);
+        symmetric(m, |i, j| {
+            (0..rank)
+                .map(|k| a[i * rank + k] * a[j * rank + k])
+                .sum::<f64>()
+                / m as f64
+        })
+    }
+
+    fn definite(&mut self, m: usize) -> Vec<f64> {
+        let mut matrix = self.gram(m, m);
+        for i in 0..m {
+            matrix[i * m + i] += 0.05;
+        }
+        matrix
+    }
+}
+
+fn symmetric(m: usize, entry: impl Fn(usize, usize) -> f64) -> Vec<f64> {
+    let mut matrix = vec![0.0; m * m];
+    for i in 0..m {
+        for j in 0..=i {
+            (matrix[j * m + i], matrix[i * m + j]) = (entry(i, j), entry(i, j));
+        }
+    }
+    matrix
+}
+
+fn product(matrix: &[f64], z: &[f64]) -> Vec<f64> {
+    let m = z.len();
+    (0..m)
+        .map(|i| (0..m).map(|j| matrix[j * m + i] * z[j]).sum())
+        .collect()
+}
+
+fn max_abs(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |max: f64, x| max.max(x.abs()))
+}
+
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    a.iter()
+        .zip(b)
+        .fold(0.0, |max: f64, (a, b)| max.max((a - b).abs()))
+}
+
+struct Answer<T> {
+    solution: Solution,
+    z: Vec<T>,
+    w: Vec<T>,
+}
+
+fn run<T: Scalar>(solver: &dyn Solver<T>, matrix: &[T], q: &[T], settings: &Settings) -> Answer<T> {
+    let problem = Problem::new(matrix, q).unwrap();
+    let mut scratch = Scratch::new(q.len());
+    let (mut z, mut w) = (q.to_vec(), q.to_vec());
+    let solution = solver
+        .solve(
+            &problem,
+            settings,
+            &mut scratch,
+            Start::Cold,
+            &mut z,
+            &mut w,
+        )
+        .unwrap();
+    Answer { solution, z, w }
+}
+
+/// Solved by `solver`, by its own word and by the independent check.
+fn solved(solver: &dyn Solver<f64>, matrix: &[f64], q: &[f64], case: &str) -> Answer<f64> {
+    let answer = run(solver, matrix, q, &Settings::default());
+    let certificate = check(&Problem::new(matrix, q).unwrap(), &answer.z).unwrap();
+    let case = format!(
+        "{case}, {}: {:?}, {certificate:?}",
+        solver.name(),
+        answer.solution
+    );
+    assert_eq!(answer.solution.status, Status::Solved, "{case}");
+    assert!(certificate.natural_residual <= 1e-10, "{case}");
+    assert!(answer.z.iter().all(|z| *z >= 0.0), "{case}");
+    answer
+}
+
+/// All methods for symmetric positive semi-definite M give the same gaps; `max_z_error` compares the forces too.
+fn all_agree(matrix: &[f64], q: &[f64], max_z_error: Option<f64>, case: &str) -> Answer<f64> {
+    let first = solved(&Automatic, matrix, q, case);
+    let others: [&dyn Solver<f64>; 3] = [&BlockPivoting, &ActiveSet, &Lemke];
+    for solver in others {
+        let other = solved(solver, matrix, q, case);
+        let w_error = distance(&first.w, &other.w) / max_abs(q).max(f64::MIN_POSITIVE);
+        assert!(
+            w_error <= 1e-9,
+            "{case}, {}: gaps {w_error:e}",
+            solver.name()
+        );
+        if let Some(max) = max_z_error {
+            let size = max_abs(&first.z).max(f64::MIN_POSITIVE);
+            let z_error = distance(&first.z, &other.z) / size;
+            assert!(
+                z_error <= max,
+                "{case}, {}: forces {z_error:e}",
+                solver.name()
+            );
+        }
+    }
+    first
+}
+
+/// min ½ zᵀ M z + qᵀ z over z ≥ 0 by an interior-point method that shares nothing with ours.
+fn clarabel(matrix: &[f64], q: &[f64]) -> Vec<f64> {
+    let m = q.len();
+    let columns = |lower: bool| {
+        let (mut starts, mut rows, mut values) = (vec![0], vec![], vec![]);
+        for j in 0..m {
+            for i in 0..=j {
+                if lower || i == j {
+                    rows.push(i);
+                    values.push(if lower { matrix[j * m + i] } else { -1.0 });
+                }
+            }
+            starts.push(rows.len());
+        }
+        CscMatrix::new(m, m, starts, rows, values)
+    };
+    let settings = DefaultSettingsBuilder::default()
+        .verbose(false)
+        .build()
+        .unwrap();
+    let mut solver = DefaultSolver::new(
+        &columns(true),
+        q,
+        &columns(false),
+        &vec![0.0; m],
+        &[NonnegativeConeT(m)],
+        settings,
+    )
+    .unwrap();
+    solver.solve();
+    assert_eq!(solver.solution.status, SolverStatus::Solved);
+    solver.solution.x
+}
+
+#[test]
+fn positive_definite_agrees_with_an_interior_point_method() {
+    let mut numbers = Numbers(1);
+    for m in [1, 2, 5, 12, 30, 60] {
+        for _ in 0..5 {
+            let matrix = numbers.definite(m);
+            let q = numbers.take(m);
+            let ours = all_agree(&matrix, &q, Some(1e-9), "definite");
+            let theirs: Vec<f64> = clarabel(&matrix, &q).iter().map(|z| z.max(0.0)).collect();
+            let energy = |z: &[f64]| -> f64 {
+                let pushed = product(&matrix, z);
+                (0..m).map(|i| z[i] * (0.5 * pushed[i] + q[i])).sum()
+            };
+            let above = energy(&theirs) - energy(&ours.z);
+            let scale = energy(&theirs).abs() + 1.0;
+            assert!(above >= -1e-12 * scale, "ours is not the least: {above:e}");
+            assert!(above <= 1e-6 * scale, "{m} rows: {above:e} of {scale:e}");
+            // ½ λ_min |Δz|² is at most what an energy is above the least one.
+            let apart = distance(&ours.z, &theirs);
+            assert!(0.5 * 0.05 * apart * apart <= above + 1e-14 * scale);
+        }
+    }
+}
+
+#[test]
+fn rows_of_all_scales_are_solved() {
+    let mut numbers = Numbers(2);
+    for m in [3, 12, 40] {
+        for _ in 0..5 {
+            let matrix = numbers.definite(m);
+            let q = numbers.take(m);
+            let plain = solved(&Automatic, &matrix, &q, "before scaling");
+            // Rows from 1e-9 to 1e3: another unit in each row.
+            let unit: Vec<f64> = (0..m)
+                .map(|_| 10_f64.powf(6.0 * numbers.next() - 3.0))
+                .collect();
+            let scaled = symmetric(m, |i, j| unit[i] * matrix[j * m + i] * unit[j]);
+            let scaled_q: Vec<f64> = q.iter().zip(&unit).map(|(q, u)| q * u).collect();
+            let answer = solved(&Automatic, &scaled, &scaled_q, "scaled");
+            let back: Vec<f64> = answer.z.iter().zip(&unit).map(|(z, u)| z * u).collect();
+            let error = distance(&back, &plain.z) / max_abs(&plain.z).max(1e-6);
+            assert!(error < 1e-9, "{m} rows: {error:e}");
+        }
+    }
+}
+
+#[test]
+fn semidefinite_rows_repeated_and_dependent_are_solved_by_every_method() {
+    let mut numbers = Numbers(3);
+    for m in [2, 10, 30] {
+        for rank in [1, 3, m / 2 + 1] {
+            let matrix = numbers.gram(m, rank);
+            let load = numbers.take(m);
+            // In the range of M, so that there is a solution.
+            let q = product(&matrix, &load);
+            let case = format!("rank {rank} of {m}");
+            all_agree(&matrix, &q, None, &case);
+            let twice = symmetric(2 * m, |i, j| matrix[(j % m) * m + i % m]);
+            let q_twice: Vec<f64> = (0..2 * m).map(|i| q[i % m]).collect();
+            let repeated = all_agree(&twice, &q_twice, None, &format!("{case}, each twice"));
+            assert!(distance(&repeated.w[..m], &repeated.w[m..]) <= 1e-9 * max_abs(&q));
+        }
+    }
+}
+
+#[test]
+fn nearly_parallel_normals_and_hilbert_matrices_are_solved() {
+    for angle in [1e-2, 1e-4, 1e-6, 1e-8, 0.0] {
+        for m in [2, 8, 25] {
+            // Normals in a fan around z, a compliance with a stiff and two soft directions.
+            let normal = |i: usize| {
+                let (a, b) = (angle * i as f64, angle * (i * i % 7) as f64);
+                let length = (1.0 + a * a + b * b).sqrt();
+                [a / length, b / length, 1.0 / length]
+            };
+            let matrix = symmetric(m, |i, j| {
+                let (a, b) = (normal(i), normal(j));
+                3e-4 * a[0] * b[0] + 2e-4 * a[1] * b[1] + 1e-6 * a[2] * b[2]
+            });
+            let push = [2e-5, -1e-5, 1e-4];
+            let q: Vec<f64> = (0..m)
+                .map(|i| -(0..3).map(|k| normal(i)[k] * push[k]).sum::<f64>())
+                .collect();
+            all_agree(&matrix, &q, None, &format!("{m} normals within {angle:e}"));
+        }
+    }
+    for m in 2..=12 {
+        let hilbert = symmetric(m, |i, j| 1.0 / (i + j + 1) as f64);
+        let alternating: Vec<f64> = (0..m)
+            .map(|i| if i % 2 == 0 { -1.0 } else { 0.5 })
+            .collect();
+        solved(&Automatic, &hilbert, &alternating, &format!("Hilbert {m}"));
+        solved(&ActiveSet, &hilbert, &alternating, &format!("Hilbert {m}"));
+    }
+}
+
+#[test]
+fn gaps_that_just_touch_need_no_force_and_stay_closed() {
+    let mut numbers = Numbers(4);
+    for m in [1, 6, 20] {
+        let matrix = numbers.definite(m);
+        // z > 0 in the first third; the others closed without force, half of them, or open.
+        let z: Vec<f64> = (0..m)
+            .map(|i| {
+                if i % 3 == 0 {
+                    1.0 + numbers.next().abs()
+                } else {
+                    0.0
+                }
+            })
+            .collect();
+        let w: Vec<f64> = (0..m).map(|i| if i % 3 == 2 { 1.0 } else { 0.0 }).collect();
+        let q: Vec<f64> = product(&matrix, &z)
+            .iter()
+            .zip(&w)
+            .map(|(p, w)| w - p)
+            .collect();
+        let answer = all_agree(&matrix, &q, Some(1e-9), "just touching");
+        assert!(distance(&answer.z, &z) < 1e-10 * max_abs(&z));
+        let all_zero = solved(&Automatic, &matrix, &vec![0.0; m], "zero gaps");
+        assert!(all_zero.z.iter().all(|z| *z == 0.0));
+    }
+}
+
+/// Unsymmetric with positive principal minors, far from definite: a triangle with large entries, rows permuted alike.
+#[test]
+fn matrices_with_positive_principal_minors_are_solved() {
+    let mut numbers = Numbers(5);
+    // Not larger: the inverse of such a triangle grows with size^m.
+    for (m, sizes) in [
+        (1, [1.0, 10.0]),
+        (4, [1.0, 10.0]),
+        (12, [1.0, 4.0]),
+        (40, [0.1, 0.5]),
+    ] {
+        for size in sizes {
+            let mut order: Vec<usize> = (0..m).collect();
+            order.sort_by_key(|i| (i * 7919) % 31);
+            let mut matrix = vec![0.0; m * m];
+            for i in 0..m {
+                for j in 0..=i {
+                    let entry = if i == j { 1.0 } else { size * numbers.next() };
+                    matrix[order[j] * m + order[i]] = entry;
+                }
+            }
+            let z: Vec<f64> = (0..m)
+                .map(|i| (numbers.next() * (i % 2) as f64).abs())
+                .collect();
+            let w: Vec<f64> = z
+                .iter()
+                .map(|z| if *z == 0.0 { numbers.next().abs() } else { 0.0 })
+                .collect();
+            let q: Vec<f64> = product(&matrix, &z)
+                .iter()
+                .zip(&w)
+                .map(|(p, w)| w - p)
+                .collect();
+            let case = format!("P-matrix of {m}, entries to {size}");
+            let answer = solved(&Automatic, &matrix, &q, &case);
+            assert!(
+                distance(&answer.z, &z) <= 1e-6 * max_abs(&z).max(1e-300),
+                "{case}"
+            );
+        }
+    }
+}
+
+/// Copositive-plus: semidefinite plus skew, or nonnegative with a positive diagonal. Lemke's method finds a
+/// solution or proves that there is none.
+#[test]
+fn copositive_plus_is_solved_or_proved_to_have_no_solution() {
+    let mut numbers = Numbers(6);
+    let (mut n_solved, mut n_none) = (0, 0);
+    for m in [2, 5, 12, 25] {
+        for kind in 0..10 {
+            let mut matrix = if kind % 2 == 0 {
+                numbers.gram(m, m / 2 + 1)
+            } else {
+                let entries = numbers.take(m * m);
+                let mut matrix: Vec<f64> = entries.iter().map(|x| x.abs()).collect();
+                for i in 0..m {
+                    matrix[i * m + i] += 0.1;
+                }
+                matrix
+            };
+            if kind % 2 == 0 {
+                for i in 0..m {
+                    for j in 0..i {
+                        let skew = 0.3 * numbers.next();
+                        matrix[j * m + i] += skew;
+                        matrix[i * m + j] -= skew;
+                    }
+                }
+            }
+            let q = numbers.take(m);
+            let answer = run(&Lemke, &matrix, &q, &Settings::default());
+            match answer.solution.status {
+                Status::Solved => {
+                    n_solved += 1;
+                    solved(&Lemke, &matrix, &q, "copositive-plus");
+                    solved(&Automatic, &matrix, &q, "copositive-plus");
+                }
+                Status::NoSolution => {
+                    n_none += 1;
+                    let same = run(&Automatic, &matrix, &q, &Settings::default());
+                    assert_eq!(same.solution.status, Status::NoSolution);
+                }
+                other => panic!("{other:?} with {m} rows"),
+            }
+        }
+    }
+    assert!(
+        n_solved >= 20,
+        "{n_solved} solved, {n_none} without solution"
+    );
+}
+
+#[test]
+fn kept_factor_gives_the_answers_of_a_cold_start() {
+    let mut numbers = Numbers(7);
+    for (m, rank) in [(1, 1), (10, 10), (40, 40), (40, 9), (90, 90)] {
+        let matrix = if rank == m {
+            numbers.definite(m)
+        } else {
+            numbers.gram(m, rank)
+        };
+        let mut load = numbers.take(m);
+        let settings = Settings::default();
+        let mut scratch = Scratch::new(m);
+        let (mut z, mut w) = (vec![0.0; m], vec![0.0; m]);
+        for step in 0..30 {
+            for load in &mut load {
+                *load += 0.05 * numbers.next();
+            }
+            let q = product(&matrix, &load);
+            let problem = Problem::symmetric(&matrix, &q).unwrap();
+            let solution = solve(
+                &problem,
+                &settings,
+                &mut scratch,
+                Start::Kept,
+                &mut z,
+                &mut w,
+            )
+            .unwrap();
+            assert_eq!(
+                solution.status,
+                Status::Solved,
+                "step {step} of rank {rank} of {m}"
+            );
+            let cold = solved(&Automatic, &matrix, &q, "cold");
+            let allowed = 1e-9 * max_abs(&q);
+            assert!(
+                distance(&w, &cold.w) <= allowed,
+                "step {step} of rank {rank} of {m}"
+            );
+        }
+    }
+}
+
+#[test]
+fn kept_factor_of_another_matrix_is_found_out() {
+    let mut numbers = Numbers(8);
+    for m in [5, 30] {
+        let mut scratch = Scratch::new(m);
+        let (mut z, mut w) = (vec![0.0; m], vec![0.0; m]);
+        for _ in 0..10 {
+            let (matrix, q) = (numbers.definite(m), numbers.take(m));
+            let problem = Problem::symmetric(&matrix, &q).unwrap();
+            let settings = Settings::default();
+            let solution = solve(
+                &problem,
+                &settings,
+                &mut scratch,
+                Start::Kept,
+                &mut z,
+                &mut w,
+            )
+            .unwrap();
+            assert_eq!(solution.status, Status::Solved);
+            let cold = solved(&Automatic, &matrix, &q, "cold");
+            assert!(distance(&z, &cold.z) <= 1e-9 * max_abs(&cold.z));
+        }
+    }
+}
+
+#[test]
+fn f32_keeps_five_digits() {
+    let single = |values: &[f64]| values.iter().map(|x| *x as f32).collect::<Vec<f32>>();
+    let mut numbers = Numbers(9);
+    for m in [1, 4, 20, 80] {
+        for rank in [m, m / 3 + 1] {
+            let matrix = if rank == m {
+                numbers.definite(m)
+            } else {
+                numbers.gram(m, rank)
+            };
+            let q = product(&matrix, &numbers.take(m));
+            let expected = solved(&Automatic, &matrix, &q, "f64");
+            let (matrix, q) = (single(&matrix), single(&q));
+            let solvers: [&dyn Solver<f32>; 3] = [&Automatic, &ActiveSet, &Lemke];
+            for solver in solvers {
+                let answer = run(solver, &matrix, &q, &Settings::of::<f32>());
+                let problem = Problem::new(&matrix, &q).unwrap();
+                let residual = check(&problem, &answer.z).unwrap().natural_residual;
+                let case = format!("rank {rank} of {m}, {}: {residual:e}", solver.name());
+                assert_eq!(answer.solution.status, Status::Solved, "{case}");
+                assert!(residual <= 1e-5, "{case}");
+                let w: Vec<f64> = answer.w.iter().map(|w| f64::from(*w)).collect();
+                assert!(
+                    distance(&w, &expected.w) <= 1e-4 * max_abs(&expected.w).max(1e-2),
+                    "{case}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn gauss_seidel_converges_and_a_spent_budget_is_flagged() {
+    let mut numbers = Numbers(10);
+    let (matrix, q) = (numbers.definite(15), numbers.take(15));
+    let generous = Settings {
+        max_sweeps: 100_000,
+        ..Settings::default()
+    };
+    let swept = run(&GaussSeidel, &matrix, &q, &generous);
+    assert_eq!(swept.solution.status, Status::Solved);
+    let direct = solved(&Automatic, &matrix, &q, "direct");
+    assert!(distance(&swept.z, &direct.z) <= 1e-7 * max_abs(&direct.z));
+    let tight = Settings {
+        max_sweeps: 1,
+        max_rounds: 0,
+        max_pivots: 1,
+        ..Settings::default()
+    };
+    let solvers: [&dyn Solver<f64>; 4] = [&GaussSeidel, &ActiveSet, &Lemke, &BlockPivoting];
+    for solver in solvers {
+        let spent = run(solver, &matrix, &q, &tight);
+        assert_eq!(spent.solution.status, Status::Budget, "{}", solver.name());
+        assert!(spent.solution.certificate.natural_residual > 1e-10);
+        assert!(spent.z.iter().all(|z| z.is_finite() && *z >= 0.0));
+    }
+}
+
+#[test]
+fn deadline_in_the_past_ends_every_method_at_once_with_a_flag() {
+    let m = 24;
+    let mut murty = vec![0.0; m * m];
+    for j in 0..m {
+        murty[j * m + j] = 1.0;
+        for i in j + 1..m {
+            murty[j * m + i] = 2.0;
+        }
+    }
+    let fathi = symmetric(m, |i, j| {
+        (0..m).map(|k| murty[k * m + i] * murty[k * m + j]).sum()
+    });
+    let q: Vec<f64> = (0..m)
+        .map(|i| if i % 2 == 0 { -1.0 } else { -0.3 })
+        .collect();
+    let settings = Settings {
+        deadline: Some(std::time::Instant::now()),
+        ..Settings::default()
+    };
+    let solvers: [&dyn Solver<f64>; 5] =
+        [&Automatic, &BlockPivoting, &ActiveSet, &Lemke, &GaussSeidel];
+    for solver in solvers {
+        let answer = run(solver, &fathi, &q, &settings);
+        // The first guess, or the chain's last resort, one direct solve, may still hit.
+        let is_solved = answer.solution.certificate.natural_residual <= 1e-10;
+        let is_chain = solver.name() == "automatic";
+        assert!(is_chain || solver.name() == "block pivoting" || !is_solved);
+        assert_eq!(answer.solution.status == Status::Solved, is_solved);
+        assert!(answer.solution.pivots <= m && answer.solution.sweeps == 0);
+        assert!(answer.z.iter().chain(&answer.w).all(|x| x.is_finite()));
+    }
+}
+
+#[test]
+fn methods_for_symmetric_matrices_refuse_others() {
+    let skew = [1.0, 0.5, -0.5, 1.0];
+    let q = [-1.0, -1.0];
+    let problem = Problem::new(&skew, &q).unwrap();
+    assert!(!problem.is_symmetric());
+    let refused = Error::NotSymmetric {
+        row: 1,
+        column: 0,
+        value: 0.5,
+        mirrored: -0.5,
+    };
+    let (mut z, mut w) = ([0.0; 2], [0.0; 2]);
+    let solvers: [&dyn Solver<f64>; 2] = [&ActiveSet, &GaussSeidel];
+    for solver in solvers {
+        let answer = solver.solve(
+            &problem,
+            &Settings::default(),
+            &mut Scratch::new(2),
+            Start::Cold,
+            &mut z,
+            &mut w,
+        );
+        assert_eq!(answer.unwrap_err(), refused);
+    }
+    assert_eq!(Problem::symmetric(&skew, &q).unwrap_err(), refused);
+    // Round-off is no skewness.
+    assert!(Problem::symmetric(&[1.0, 0.5, 0.5 + 1e-15, 1.0], &q).is_ok());
+}

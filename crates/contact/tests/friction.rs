@@ -1,23 +1,15 @@
 //! Friction against its polyhedral cousin solved by Lemke's method, its limits, and its invariances.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
+#[path = "support/numbers.rs"]
+mod numbers;
+
 use contact::Error;
 use contact::friction::{Problem, Scratch, Settings, Solution, State, Status, check, solve};
 use contact::lcp;
-
-/// The same numbers on every run.
-struct Numbers(u64);
+use numbers::{Numbers, distance, max_abs};
 
 impl Numbers {
-    /// From -1 to 1.
-    fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
-
     /// Symmetric positive definite over n contacts of `each` rows, the first of them the normal; condition about 100.
     /// Normals and tangents are coupled as weakly as in an elastic body, where the answer is unique.
     fn delassus(&mut self, n_contacts: usize, each: usize) -> Vec<f64> {
@@ -83,17 +75,6 @@ fn solved(w: &[f64], q: &[f64], mu: &[f64]) -> Answer {
     );
     assert!(answer.solution.certificate.natural_residual < 1e-8);
     answer
-}
-
-fn max_abs(values: &[f64]) -> f64 {
-    values.iter().fold(0.0, |max: f64, x| max.max(x.abs()))
-}
-
-fn distance(a: &[f64], b: &[f64]) -> f64 {
-    assert_eq!(a.len(), b.len());
-    a.iter()
-        .zip(b)
-        .fold(0.0, |max: f64, (a, b)| max.max((a - b).abs()))
 }
 
 /// Forces with the disk replaced by a polygon of `edges` corners, by Lemke's method.

@@ -1,6 +1,9 @@
 //! Hard families of problems, each by every method that is made for it, and against an independent QP solver.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
+#[path = "support/numbers.rs"]
+mod numbers;
+
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{
     DefaultSettingsBuilder, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus,
@@ -10,20 +13,9 @@ use contact::lcp::{
     ActiveSet, Automatic, BlockPivoting, GaussSeidel, Lemke, Problem, Scalar, Scratch, Settings,
     Solution, Solver, Start, Status, check, solve,
 };
-
-/// The same numbers on every run.
-struct Numbers(u64);
+use numbers::{Numbers, distance, max_abs};
 
 impl Numbers {
-    /// From -1 to 1.
-    fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
-
     fn take(&mut self, n: usize) -> Vec<f64> {
         (0..n).map(|_| self.next()).collect()
     }
@@ -63,17 +55,6 @@ fn product(matrix: &[f64], z: &[f64]) -> Vec<f64> {
     (0..m)
         .map(|i| (0..m).map(|j| matrix[j * m + i] * z[j]).sum())
         .collect()
-}
-
-fn max_abs(values: &[f64]) -> f64 {
-    values.iter().fold(0.0, |max: f64, x| max.max(x.abs()))
-}
-
-fn distance(a: &[f64], b: &[f64]) -> f64 {
-    assert_eq!(a.len(), b.len());
-    a.iter()
-        .zip(b)
-        .fold(0.0, |max: f64, (a, b)| max.max((a - b).abs()))
 }
 
 struct Answer<T> {
@@ -518,19 +499,63 @@ fn gauss_seidel_converges_and_a_spent_budget_is_flagged() {
     }
 }
 
+/// 2^m - 1 pivots for the rule of the last row. Source: Murty (1988), chapter 6.
+fn murty(m: usize) -> Vec<f64> {
+    let mut matrix = vec![0.0; m * m];
+    for j in 0..m {
+        matrix[j * m + j] = 1.0;
+        for i in j + 1..m {
+            matrix[j * m + i] = 2.0;
+        }
+    }
+    matrix
+}
+
+/// Murty's matrix times its transpose: symmetric and as bad. Source: Fathi (1979).
+fn fathi(m: usize) -> Vec<f64> {
+    let l = murty(m);
+    symmetric(m, |i, j| (0..m).map(|k| l[k * m + i] * l[k * m + j]).sum())
+}
+
+#[test]
+fn worst_cases_hit_a_small_budget_and_are_flagged() {
+    let mut numbers = Numbers(11);
+    let settings = Settings {
+        max_rounds: 4,
+        max_pivots: 4,
+        max_sweeps: 4,
+        ..Settings::default()
+    };
+    let mut n_flagged = 0;
+    for m in [10, 20, 40] {
+        for matrix in [murty(m), fathi(m)] {
+            for _ in 0..5 {
+                let q: Vec<f64> = (0..m).map(|_| -0.6 + numbers.next()).collect();
+                let answer = run(&Automatic, &matrix, &q, &settings);
+                let certificate = check(&Problem::new(&matrix, &q).unwrap(), &answer.z).unwrap();
+                let is_solved = certificate.natural_residual <= 1e-10;
+                assert_eq!(answer.solution.status == Status::Solved, is_solved);
+                assert!(answer.z.iter().all(|z| z.is_finite() && *z >= 0.0));
+                assert!(answer.w.iter().all(|w| w.is_finite()));
+                // Work stays within the budget: a round moves at most all rows, Lemke's answer gets one more.
+                let (rounds, pivots) = (answer.solution.rounds, answer.solution.pivots);
+                assert!(rounds <= settings.max_rounds + 2, "{rounds} rounds");
+                assert!(
+                    pivots <= rounds * m + settings.max_pivots,
+                    "{pivots} pivots"
+                );
+                assert!(answer.solution.sweeps <= settings.max_sweeps);
+                n_flagged += usize::from(!is_solved);
+            }
+        }
+    }
+    assert!(n_flagged >= 10, "{n_flagged} of 30");
+}
+
 #[test]
 fn deadline_in_the_past_ends_every_method_at_once_with_a_flag() {
     let m = 24;
-    let mut murty = vec![0.0; m * m];
-    for j in 0..m {
-        murty[j * m + j] = 1.0;
-        for i in j + 1..m {
-            murty[j * m + i] = 2.0;
-        }
-    }
-    let fathi = symmetric(m, |i, j| {
-        (0..m).map(|k| murty[k * m + i] * murty[k * m + j]).sum()
-    });
+    let fathi = fathi(m);
     let q: Vec<f64> = (0..m)
         .map(|i| if i % 2 == 0 { -1.0 } else { -0.3 })
         .collect();

@@ -56,12 +56,23 @@ pub(super) fn dot<T: Scalar>(x: &[T], y: &[T]) -> T {
     ((a + e) + (b + f)) + ((c + g) + (d + h)) + rest
 }
 
-/// Largest absolute value, 0 for an empty slice.
+/// Largest absolute value, 0 for an empty slice. In lanes, so that it is vectorised.
 pub(super) fn max_abs<T: Scalar>(values: &[T]) -> T {
-    values.iter().fold(T::zero(), |max, x| {
-        let x = num_traits::Float::abs(*x);
+    let larger = |max: T, x: T| {
+        let x = num_traits::Float::abs(x);
         if x > max { x } else { max }
-    })
+    };
+    let mut lanes = [T::zero(); 8];
+    let (chunks, rest) = values.as_chunks::<8>();
+    for chunk in chunks {
+        for (lane, &x) in lanes.iter_mut().zip(chunk) {
+            *lane = larger(*lane, x);
+        }
+    }
+    lanes
+        .iter()
+        .chain(rest)
+        .fold(T::zero(), |max, &x| larger(max, x))
 }
 
 /// x ← L⁻¹ x for the leading `n` rows of a unit lower triangle, column-major with leading dimension `ld`.

@@ -125,16 +125,24 @@ impl<'a, T: Scalar> Problem<'a, T> {
 }
 
 fn check_finite<T: Scalar>(what: &'static str, values: &[T]) -> Result<(), Error> {
-    // Whole chunks without an early exit, so that the loop is vectorised.
-    for (chunk_idx, chunk) in values.chunks(64).enumerate() {
-        let is_finite = |x: &T| num_traits::Float::is_finite(*x);
-        if !chunk.iter().fold(true, |ok, x| ok & is_finite(x)) {
-            let inside = chunk.iter().position(|x| !is_finite(x)).unwrap_or(0);
-            return Err(Error::NotFinite {
-                what,
-                index: chunk_idx * 64 + inside,
-            });
+    // A sum is finite only if all its terms are: one pass at the speed of memory. A sum that is not may have
+    // overflowed; then, and only then, one by one.
+    let mut sums = [T::zero(); 16];
+    let (chunks, rest) = values.as_chunks::<16>();
+    for chunk in chunks {
+        for lane in 0..16 {
+            sums[lane] += chunk[lane];
         }
     }
-    Ok(())
+    let sum = sums.iter().chain(rest).copied().sum::<T>();
+    if num_traits::Float::is_finite(sum) {
+        return Ok(());
+    }
+    match values
+        .iter()
+        .position(|x| !num_traits::Float::is_finite(*x))
+    {
+        Some(index) => Err(Error::NotFinite { what, index }),
+        None => Ok(()),
+    }
 }

@@ -5,8 +5,8 @@ use super::ldl::Ldl;
 use super::lu::Lu;
 use super::pivoting::Work;
 use super::{
-    Method, Problem, Scalar, Scratch, Settings, Solution, Start, Status, active_set, dense,
-    gauss_seidel, lemke, pivoting, scaling,
+    Certificate, Method, Problem, Scalar, Scratch, Settings, Solution, Start, Status, active_set,
+    dense, gauss_seidel, lemke, pivoting, scaling,
 };
 use crate::error::Error;
 
@@ -57,12 +57,16 @@ pub(super) fn solve<T: Scalar>(
         rounds: 0,
         pivots: 0,
         sweeps: 0,
+        certificate: None,
     };
     let (status, method) = run.solve(request.scratch, request.only, start, z, w);
+    let certificate = run
+        .certificate
+        .unwrap_or_else(|| certificate::of(problem, z, w));
     Ok(Solution {
         status,
         method,
-        certificate: certificate::of(problem, z, w),
+        certificate,
         rounds: run.rounds,
         pivots: run.pivots,
         sweeps: run.sweeps,
@@ -76,6 +80,8 @@ struct Run<'a, T: Scalar> {
     rounds: usize,
     pivots: usize,
     sweeps: usize,
+    /// That of z and w, where it is known already.
+    certificate: Option<Certificate>,
 }
 
 /// The best forces so far and how good they are.
@@ -190,6 +196,7 @@ impl<T: Scalar> Run<'_, T> {
         let mut method = Method::BlockPivoting;
         let mut best = Best::none(&mut scratch.best_z[..m]);
         let mut is_best_current = false;
+        let mut last_certificate = Certificate::default();
         let mut is_first_step = true;
         scratch.basis.start(problem, start, &scratch.scale);
         let mut factor = if may_keep {
@@ -235,16 +242,20 @@ impl<T: Scalar> Run<'_, T> {
             if clamp(z) {
                 dense::gaps_into(problem, z, w);
             }
-            let residual = certificate::of(problem, z, w).natural_residual;
+            let certificate = certificate::of(problem, z, w);
+            let residual = certificate.natural_residual;
             let gained = residual < 0.5 * best.residual;
             is_best_current = best.offer(z, residual);
+            last_certificate = certificate;
             if best.residual <= T::GOAL || outcome.end == pivoting::End::Budget || !gained {
                 break;
             }
             scratch.center[..m].copy_from_slice(z);
         }
         if best.residual <= self.settings.tolerance {
-            if !is_best_current {
+            if is_best_current {
+                self.certificate = Some(last_certificate);
+            } else {
                 best.give(problem, z, w);
             }
             return Some((Status::Solved, method));
@@ -454,7 +465,7 @@ impl<T: Scalar> Run<'_, T> {
                 z,
                 w,
             };
-            let rounds = if step == 0 { max_rounds } else { 1 };
+            let rounds = if step == 0 { max_rounds } else { 0 };
             let mut factor = Lu::new(&mut scratch.dense, &mut scratch.lu_rows);
             let outcome = work.block_pivoting(&mut factor, rounds);
             self.rounds += outcome.rounds;

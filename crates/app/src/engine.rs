@@ -13,13 +13,13 @@ mod part;
 mod report;
 mod scratch;
 mod switch;
-mod watch_list;
+mod watch;
 
 use std::sync::Arc;
 
 use contact::delassus::{CouplingCompliance, delassus_into};
 use contact::lcp;
-use contact::plane::{Plane, planes_into, wrench_on_tool};
+use contact::plane::{planes_and_rest_into, planes_into, wrench_on_tool};
 use contact::tool::Tool;
 use device::VirtualCoupling;
 use glam::DVec3;
@@ -35,7 +35,7 @@ use part::Deformed;
 pub use report::{ActiveContact, N_STAGES, Stage, StepReport};
 use scratch::Scratch;
 pub use switch::switch_bound;
-use watch_list::{State, WatchList};
+use watch::{State, Watch};
 
 /// How often the contact planes are drawn anew within one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,9 +71,11 @@ pub struct EngineSettings {
 /// Nearby states need 3 to 7; more than 60 means that two sets of planes alternate.
 const MAX_PASSES: u32 = 60;
 
-/// Slack of the watch list over the distance at which nodes get a plane: long enough to be kept for
-/// tens of steps of a hand, short enough that few nodes are evaluated in vain.
-const WATCH_SLACK: f64 = 30.0;
+/// Distance beyond which a node is not watched any more, in distances at which nodes get a plane.
+const WATCH_SLACK: f64 = 3.0;
+
+/// Of the change of the last pass over that of the one before, below which passes are taken to shrink steadily.
+const STEADY: f64 = 0.25;
 
 /// Strides in one step; at 1 kHz and a stride of 0.2 mm this follows a hand at 6.4 m/s.
 const MAX_STRIDES: f64 = 32.0;
@@ -87,7 +89,7 @@ pub struct Engine {
     coupling_compliance: Option<[[f64; 6]; 6]>,
     settings: EngineSettings,
     reach_of_rotation: f64,
-    watch_list: WatchList,
+    watch: Watch,
     scratch: Scratch,
     last_target: Option<DPose3>,
     /// Deviation of the tool from its target: position (m) and rotation vector (rad).
@@ -122,7 +124,11 @@ impl Engine {
                 max_contacts,
                 ..settings
             },
-            watch_list: WatchList::new(&part, WATCH_SLACK * settings.near_distance)?,
+            watch: Watch::new(
+                &part,
+                settings.near_distance,
+                WATCH_SLACK * settings.near_distance,
+            )?,
             scratch,
             last_target: None,
             deviation: [0.0; 6],
@@ -186,7 +192,7 @@ impl Engine {
     /// Forgets all contact: undeformed part, tool at its next target.
     pub fn reset(&mut self) {
         self.scratch.clear_contacts();
-        self.watch_list.forget();
+        self.watch.forget();
         self.last_target = None;
         self.deviation = [0.0; 6];
         self.last_wrench = [0.0; 6];
@@ -277,13 +283,20 @@ impl Engine {
         report.passes = 0;
         report.converged = false;
         let mut tool_pose = VirtualCoupling::pose_from_deviation(target, &self.deviation);
+        let mut change_before = f64::INFINITY;
         while report.passes < max_passes {
             report.passes += 1;
             let change = self.pass(&mut tool_pose, target, report);
-            if change <= tolerance {
+            // What further passes would change: a geometric series, twice over. Only once all that moves is far
+            // smaller than the distance at which nodes get a plane, so that no other node can come in.
+            let ratio = change / change_before;
+            let is_steady = ratio < STEADY && change < 0.01 * self.settings.near_distance;
+            let left = 2.0 * change * ratio / (1.0 - ratio);
+            if change <= tolerance || (is_steady && left <= tolerance) {
                 report.converged = true;
                 break;
             }
+            change_before = change;
         }
         if matches!(
             self.settings.contact_iterations,
@@ -310,7 +323,7 @@ impl Engine {
         if let Some(constrained) = &mut self.constrained {
             let active = &self.scratch.active;
             let state = state_of(part, tool, tool_pose, &self.scratch, Some(constrained));
-            if self.watch_list.is_stale(state) {
+            if self.watch.is_far_due(state) {
                 constrained.make_terms(active);
             }
         }
@@ -321,7 +334,8 @@ impl Engine {
             &self.scratch,
             self.constrained.as_deref(),
         );
-        let candidates = self.watch_list.update(state, near_distance);
+        self.watch.look(state);
+        let candidates = self.watch.take_due();
         if let Some(constrained) = &mut self.constrained {
             let active = &self.scratch.active;
             if !constrained.ensure(candidates.iter().copied(), active, part) {
@@ -332,10 +346,43 @@ impl Engine {
 
         // One plane per near node, at its displaced position (paper, Fig. 3).
         let constrained = self.constrained.as_deref();
-        let planes_of = |candidates: &[u32],
-                         active: &[ActiveContact],
-                         max_gap: f64,
-                         planes: &mut Vec<Plane>| {
+        let Scratch {
+            planes,
+            active,
+            known,
+            ..
+        } = &mut self.scratch;
+        let deformed = Deformed {
+            part,
+            active,
+            constrained,
+        };
+        let position_of = |candidate: u32| {
+            let i = candidate as usize;
+            let displacement = known.get(i).unwrap_or_else(|| deformed.displacement(i));
+            part.rest_positions()[i] + displacement
+        };
+        let watch = &mut self.watch;
+        let left_out = planes_and_rest_into(
+            tool,
+            &pose,
+            &candidates,
+            position_of,
+            near_distance,
+            planes,
+            |candidate, distance| watch.postpone(candidate, distance),
+        );
+        watch.give_back(candidates);
+        report.dropped = (left_out.n_beyond_capacity + left_out.n_invalid) as u32;
+        self.scratch.find_missing();
+        let Scratch {
+            active,
+            known,
+            missing,
+            extra,
+            ..
+        } = &mut self.scratch;
+        if !missing.is_empty() {
             let deformed = Deformed {
                 part,
                 active,
@@ -343,17 +390,12 @@ impl Engine {
             };
             let position_of = |candidate: u32| {
                 let i = candidate as usize;
-                part.rest_positions()[i] + deformed.displacement(i)
+                let displacement = known.get(i).unwrap_or_else(|| deformed.displacement(i));
+                part.rest_positions()[i] + displacement
             };
-            planes_into(tool, &pose, candidates, position_of, max_gap, planes)
-        };
-
-        let Scratch { planes, active, .. } = &mut self.scratch;
-        let left_out = planes_of(candidates, active, near_distance, planes);
-        report.dropped = (left_out.n_beyond_capacity + left_out.n_invalid) as u32;
-        self.scratch.keep_seen(|missing, active, extra| {
-            planes_of(missing, active, f64::INFINITY, extra);
-        });
+            planes_into(tool, &pose, missing, position_of, f64::INFINITY, extra);
+        }
+        self.scratch.keep_seen();
         let Scratch {
             planes,
             u_before,
@@ -429,9 +471,24 @@ impl Engine {
         let mut change = (moved.translation - tool_pose.translation).length()
             + self.reach_of_rotation * moved.rotation.angle_between(tool_pose.rotation);
         *tool_pose = moved;
-        let deformed = self.deformed();
-        for (plane, before) in self.scratch.planes.iter().zip(&self.scratch.u_before) {
+        let Scratch {
+            planes,
+            u_before,
+            active,
+            known,
+            ..
+        } = &mut self.scratch;
+        let deformed = Deformed {
+            part,
+            active,
+            constrained: self.constrained.as_deref(),
+        };
+        known.forget();
+        for (plane, before) in planes.iter().zip(u_before.iter()) {
             let u = deformed.displacement(plane.candidate as usize);
+            if deformed.constrained.is_none() {
+                known.set(plane.candidate as usize, u);
+            }
             change = change.max((u - *before).length());
         }
         clock.lap(Stage::Update, report);

@@ -56,6 +56,28 @@ pub fn planes_into(
     max_gap: f64,
     planes: &mut Vec<Plane>,
 ) -> PlaneReport {
+    let beyond = |_, _| ();
+    planes_and_rest_into(
+        tool,
+        pose_part_tool,
+        candidates,
+        position_of,
+        max_gap,
+        planes,
+        beyond,
+    )
+}
+
+/// As [`planes_into`]; tells `beyond` of each candidate whose gap (m) is `max_gap` or more.
+pub fn planes_and_rest_into(
+    tool: &Tool,
+    pose_part_tool: &DPose3,
+    candidates: &[u32],
+    position_of: impl Fn(u32) -> DVec3,
+    max_gap: f64,
+    planes: &mut Vec<Plane>,
+    mut beyond: impl FnMut(u32, f64),
+) -> PlaneReport {
     let mut report = PlaneReport::default();
     planes.clear();
     // Looked up only once there is no room, and again after each exchange.
@@ -70,6 +92,7 @@ pub fn planes_into(
             continue;
         }
         if contact.signed_distance >= max_gap {
+            beyond(candidate, contact.signed_distance);
             continue;
         }
         let plane = Plane {

@@ -11,15 +11,17 @@ pub(super) struct Scratch {
     /// Planes of this pass; its capacity is the largest number of rows.
     pub(super) planes: Vec<Plane>,
     /// Planes of nodes that had one earlier in the step and are farther away now.
-    extra: Vec<Plane>,
+    pub(super) extra: Vec<Plane>,
     /// Candidates that had a plane in this step: each keeps it to the step's end.
     seen: Vec<u32>,
-    missing: Vec<u32>,
+    pub(super) missing: Vec<u32>,
     /// By candidate: number of the pass in which it last had a plane, and of the step.
     pass_of: Vec<u64>,
     stride_of: Vec<u64>,
     pass: u64,
     stride: u64,
+    /// Displacement of nodes under the forces of now, as far as it is known.
+    pub(super) known: Known,
     /// Displacement of the planes' nodes before the pass, m.
     pub(super) u_before: Vec<DVec3>,
     pub(super) w_matrix: Vec<f64>,
@@ -51,6 +53,7 @@ impl Scratch {
             stride_of: vec![0; n_candidates],
             pass: 0,
             stride: 0,
+            known: Known::new(n_candidates),
             u_before: Vec::with_capacity(rows),
             w_matrix: vec![0.0; rows * rows],
             q: vec![0.0; rows],
@@ -87,9 +90,11 @@ impl Scratch {
         for contact in &self.active {
             self.was_active[contact.candidate as usize] = true;
         }
+        self.known.forget();
     }
 
     pub(super) fn clear_contacts(&mut self) {
+        self.known.forget();
         self.active.clear();
         self.was_active.fill(false);
     }
@@ -104,30 +109,26 @@ impl Scratch {
         }
     }
 
-    /// Adds planes for nodes that had one earlier in this stride and were not `near` enough for one
-    /// now. Without them two sets of nodes can take turns: each lifts off while the other is pressed,
-    /// loses its plane, and sinks in again. With them the set only grows, and passes end.
-    ///
-    /// `plane_of` makes planes, whatever the gap, for the candidates it is given, displaced by the
-    /// contacts it is given.
-    pub(super) fn keep_seen(
-        &mut self,
-        plane_of: impl FnOnce(&[u32], &[ActiveContact], &mut Vec<Plane>),
-    ) {
+    /// Finds the nodes that had a plane earlier in this stride and were not near enough for one now.
+    pub(super) fn find_missing(&mut self) {
         self.pass += 1;
         for plane in &self.planes {
             self.pass_of[plane.candidate as usize] = self.pass;
         }
         let (pass, pass_of) = (self.pass, &self.pass_of);
         self.missing.clear();
-        let unplaned = self.seen.iter().copied();
+        let seen = self.seen.iter().copied();
         self.missing
-            .extend(unplaned.filter(|c| pass_of[*c as usize] != pass));
-        if !self.missing.is_empty() {
-            plane_of(&self.missing, &self.active, &mut self.extra);
-            let room = self.planes.capacity() - self.planes.len();
-            self.planes.extend(self.extra.drain(..).take(room));
-        }
+            .extend(seen.filter(|c| pass_of[*c as usize] != pass));
+        self.extra.clear();
+    }
+
+    /// Adds the planes of [`Self::find_missing`], which are in `extra`, whatever their gap. Without them two sets of
+    /// nodes can take turns: each lifts off while the other is pressed, loses its plane, and sinks in
+    /// again. With them the set only grows, and passes end.
+    pub(super) fn keep_seen(&mut self) {
+        let room = self.planes.capacity() - self.planes.len();
+        self.planes.extend(self.extra.drain(..).take(room));
         for plane in &self.planes {
             let stride_of = &mut self.stride_of[plane.candidate as usize];
             if *stride_of != self.stride {
@@ -185,5 +186,40 @@ impl Scratch {
                 });
             }
         }
+    }
+}
+
+/// Displacements that need not be summed again until the forces change.
+#[derive(Debug)]
+pub(super) struct Known {
+    /// By candidate, m.
+    displacement: Vec<DVec3>,
+    /// By candidate: the state its displacement belongs to.
+    state_of: Vec<u64>,
+    state: u64,
+}
+
+impl Known {
+    fn new(n_candidates: usize) -> Self {
+        Self {
+            displacement: vec![DVec3::ZERO; n_candidates],
+            state_of: vec![0; n_candidates],
+            state: 1,
+        }
+    }
+
+    /// The forces have changed.
+    pub(super) fn forget(&mut self) {
+        self.state += 1;
+    }
+
+    pub(super) fn set(&mut self, candidate: usize, displacement: DVec3) {
+        self.displacement[candidate] = displacement;
+        self.state_of[candidate] = self.state;
+    }
+
+    #[inline]
+    pub(super) fn get(&self, candidate: usize) -> Option<DVec3> {
+        (self.state_of[candidate] == self.state).then(|| self.displacement[candidate])
     }
 }

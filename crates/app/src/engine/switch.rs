@@ -42,7 +42,7 @@ impl Engine {
         scratch.centres.extend(touching);
         if scratch.centres.is_empty() {
             // What will soon touch is freed before it does.
-            let soon = self.watch_list.watched().iter();
+            let soon = self.watch.watched().iter();
             scratch.centres.extend(soon.map(|c| rest[*c as usize]));
         }
         let deformed = super::Deformed {
@@ -55,7 +55,7 @@ impl Engine {
             .iter()
             .map(|c| deformed.displacement(c.candidate as usize).length())
             .fold(0.0, f64::max);
-        let near = self.watch_list.watched();
+        let near = self.watch.watched();
         constrained.advance(&scratch.centres, near, &scratch.active, largest);
         clock.lap(Stage::FreeNodes, report);
         if constrained.is_ramping() {

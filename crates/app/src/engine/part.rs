@@ -15,6 +15,8 @@ pub struct ContactPart {
     blocks: Vec<f64>,
     /// m/N, by candidate j: bound on the norm of C_ij for all candidates i.
     largest_block: Vec<f64>,
+    /// The same for all i but j itself.
+    largest_other: Vec<f64>,
 }
 
 impl ContactPart {
@@ -31,17 +33,20 @@ impl ContactPart {
             "compliance blocks do not fit the candidates"
         );
         assert!(n_rows >= rest.len(), "the candidates are the first rows");
-        let largest_block = (0..rest.len())
+        let (largest_other, largest_block) = (0..rest.len())
             .map(|j| {
                 let column = &cast_slice::<f64, DMat3>(&blocks)[j * n_rows..][..rest.len()];
-                column.iter().map(norm_squared).fold(0.0, f64::max).sqrt()
+                let largest = |part: &[DMat3]| part.iter().map(norm_squared).fold(0.0, f64::max);
+                let other = largest(&column[..j]).max(largest(&column[j + 1..]));
+                (other.sqrt(), other.max(norm_squared(&column[j])).sqrt())
             })
-            .collect();
+            .unzip();
         Self {
             rest,
             n_rows,
             blocks,
             largest_block,
+            largest_other,
         }
     }
 
@@ -54,6 +59,7 @@ impl ContactPart {
             "one bound for each candidate"
         );
         self.largest_block.copy_from_slice(bounds);
+        self.largest_other.copy_from_slice(bounds);
         self
     }
 
@@ -75,9 +81,11 @@ impl ContactPart {
     /// Displacement of candidate `i` under the given contact forces, m: sum of C_ij f_j.
     #[inline]
     pub fn displacement(&self, i: usize, active: &[ActiveContact]) -> DVec3 {
+        // C_ij is C_jiᵀ: one column is read, not one place in each of many.
+        let column = &cast_slice::<f64, DMat3>(&self.blocks)[i * self.n_rows..][..self.rest.len()];
         let mut u = DVec3::ZERO;
         for contact in active {
-            u += *self.block(i, contact.candidate as usize) * contact.force_on_part;
+            u += column[contact.candidate as usize].mul_transpose_vec3(contact.force_on_part);
         }
         u
     }
@@ -86,6 +94,11 @@ impl ContactPart {
     /// more than this times the force on it.
     pub(super) fn largest_block(&self, candidate: u32) -> f64 {
         self.largest_block[candidate as usize]
+    }
+
+    /// As [`Self::largest_block`], for all candidates but this one.
+    pub(super) fn largest_other(&self, candidate: u32) -> f64 {
+        self.largest_other[candidate as usize]
     }
 
     /// Upper bound on the displacement of any candidate, m.

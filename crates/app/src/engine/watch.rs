@@ -3,9 +3,9 @@
 //! The engine adds up how far tool and part have moved at most since the start,
 //!
 //! ```text
-//! S += |motion of the tool's surface near the part| + Σ_j max_i ‖C_ij‖ |f_j - f_j,then|
+//! S += |motion of the tool's surface near the part| + Σ_j max_i≠j ‖C_ij‖ |f_j - f_j,then|
 //! ```
-//! both of them bounds, not estimates. A candidate found at a distance d > reach cannot be nearer than `reach`
+//! both of them bounds, not estimates; a candidate whose own force changes is always looked at. Any other found at a distance d > reach cannot be nearer than `reach`
 //! before S has grown by d - reach, because a signed distance changes by no more than point and surface
 //! move: that is when it is looked at again. Those that are far wait in a heap; those that may come near within some steps
 //! are kept in a list of their own. The cost of a step goes with the candidates near the tool, not with
@@ -32,6 +32,8 @@ pub(super) struct Watch {
     /// Candidates that are far, by when they may come within [`Self::watch_distance`]; the bits of a positive number
     /// are in its order.
     far: BinaryHeap<Reverse<(u64, u32)>>,
+    /// By candidate: its appointment, the key in the heap.
+    far_until: Vec<u64>,
     watched: Vec<u32>,
     is_watched: Vec<bool>,
     /// By candidate that is watched: nearer than reach not before this, m of [`Self::moved`].
@@ -77,7 +79,9 @@ impl Watch {
         Ok(Self {
             moved: 0.0,
             moved_rest: 0.0,
-            far: BinaryHeap::with_capacity(rest.len()),
+            // Twice as many: appointments may be void.
+            far: BinaryHeap::with_capacity(2 * rest.len()),
+            far_until: vec![0; rest.len()],
             watched: Vec::with_capacity(rest.len()),
             is_watched: vec![false; rest.len()],
             due_at: vec![0.0; rest.len()],
@@ -115,6 +119,9 @@ impl Watch {
 
     /// Finds the candidates that may be nearer than reach: [`Self::take_due`]. Does not allocate.
     pub(super) fn look(&mut self, state: State<'_>) {
+        // First those that were sent away, so that none is called in twice.
+        let is_watched = &self.is_watched;
+        self.watched.retain(|c| is_watched[*c as usize]);
         match self.pose_then {
             Some(then) => {
                 let step = self.motion_bound(&then, state) + self.change_bound(state);
@@ -130,11 +137,14 @@ impl Watch {
                 break;
             }
             self.far.pop();
+            if self.is_watched[candidate as usize] || self.far_until[candidate as usize] != at {
+                // Void: it was called in the meantime.
+                continue;
+            }
             let distance = distance_bound(state, candidate as usize);
             self.arrange(candidate, distance);
         }
-        let (is_watched, due_at, moved) = (&self.is_watched, &self.due_at, self.moved);
-        self.watched.retain(|c| is_watched[*c as usize]);
+        let (due_at, moved) = (&self.due_at, self.moved);
         self.due.clear();
         let is_due = |c: &u32| {
             let is_early = due_at[*c as usize] > moved;
@@ -157,10 +167,8 @@ impl Watch {
     /// A candidate that was due is at this distance from the tool, m, beyond reach.
     pub(super) fn postpone(&mut self, candidate: u32, distance: f64) {
         let i = candidate as usize;
-        if distance > self.reach + 2.0 * self.slack && self.is_watched[i] {
-            self.is_watched[i] = false;
-            let at = self.moved + (distance - self.reach - self.slack);
-            self.far.push(Reverse((at.to_bits(), candidate)));
+        if distance > self.reach + 2.0 * self.slack && self.far.len() < self.far.capacity() {
+            self.send_away(candidate, distance);
         } else {
             self.due_at[i] = self.moved + (distance - self.reach);
         }
@@ -172,8 +180,7 @@ impl Watch {
         // Half a slack more, so that it does not come back at once.
         let is_far = distance > self.reach + 1.5 * self.slack;
         if is_far {
-            let at = self.moved + (distance - self.reach - self.slack);
-            self.far.push(Reverse((at.to_bits(), candidate)));
+            self.send_away(candidate, distance);
             return;
         }
         self.is_watched[i] = true;
@@ -189,6 +196,7 @@ impl Watch {
         self.is_watched.fill(false);
         self.far.clear();
         let now = 0.0_f64.to_bits();
+        self.far_until.fill(now);
         self.far
             .extend((0..self.is_watched.len() as u32).map(|candidate| Reverse((now, candidate))));
     }
@@ -201,16 +209,40 @@ impl Watch {
         self.moved = sum;
     }
 
+    /// Keeps what the next look compares with. Candidates that carry force, or did, are due.
     fn remember(&mut self, state: State<'_>) {
-        for candidate in self.active_then.drain(..) {
+        for k in 0..self.active_then.len() {
+            let candidate = self.active_then[k];
             self.force_then[candidate as usize] = DVec3::ZERO;
+            self.call(candidate);
         }
+        self.active_then.clear();
         for contact in state.deformed.active {
             self.force_then[contact.candidate as usize] = contact.force_on_part;
             self.active_then.push(contact.candidate);
+            self.call(contact.candidate);
         }
         self.pose_then = Some(*state.tool_pose);
         self.switched_then = state.deformed.switched();
+    }
+
+    /// Makes a candidate due.
+    fn call(&mut self, candidate: u32) {
+        let i = candidate as usize;
+        self.due_at[i] = 0.0;
+        if !self.is_watched[i] {
+            // Its appointment in the heap is void then.
+            self.is_watched[i] = true;
+            self.watched.push(candidate);
+        }
+    }
+
+    /// Sends a candidate away until it may come within the slack.
+    fn send_away(&mut self, candidate: u32, distance: f64) {
+        let at = (self.moved + (distance - self.reach - self.slack)).to_bits();
+        self.far_until[candidate as usize] = at;
+        self.is_watched[candidate as usize] = false;
+        self.far.push(Reverse((at, candidate)));
     }
 
     /// Bound on how far any point of the tool that is near the part has moved, m.
@@ -227,21 +259,21 @@ impl Watch {
         shift + turn * lever
     }
 
-    /// Bound on the change of any candidate's displacement since the last look, m.
+    /// Bound on the change of displacement since the last look, m, of any candidate whose own force has not changed.
     fn change_bound(&self, state: State<'_>) -> f64 {
         let Deformed { part, active, .. } = state.deformed;
         let changed: f64 = active
             .iter()
             .map(|c| {
                 let then = self.force_then[c.candidate as usize];
-                part.largest_block(c.candidate) * (c.force_on_part - then).length()
+                part.largest_other(c.candidate) * (c.force_on_part - then).length()
             })
             .sum();
         let gone: f64 = self
             .active_then
             .iter()
             .filter(|c| !state.is_active[**c as usize])
-            .map(|c| part.largest_block(*c) * self.force_then[*c as usize].length())
+            .map(|c| part.largest_other(*c) * self.force_then[*c as usize].length())
             .sum();
         // The compliance itself changes by no more than all of it while free nodes are switched.
         let switched = (state.deformed.switched() - self.switched_then).min(1.0);

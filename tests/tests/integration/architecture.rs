@@ -46,3 +46,36 @@ fn every_crate_takes_the_lints_of_the_workspace() {
         assert!(text.contains("[lints]\nworkspace = true"), "{name}");
     }
 }
+
+/// What the haptic step calls must not wait for anybody: no lock, no condition, no channel, no thread.
+#[test]
+fn nothing_the_step_calls_can_lock() {
+    const WAITS: [&str; 10] = [
+        "Mutex", "RwLock", "Condvar", "OnceLock", "LazyLock", "mpsc", "Barrier", "thread::",
+        "park(", "rayon",
+    ];
+    let mut n_files = 0;
+    let mut folders = vec![
+        root().join("crates/app/src/engine"),
+        root().join("crates/contact/src"),
+    ];
+    let mut files = vec![root().join("crates/app/src/engine.rs")];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                files.push(path);
+            }
+        }
+    }
+    for path in files {
+        let text = std::fs::read_to_string(&path).unwrap();
+        n_files += 1;
+        for waits in WAITS {
+            assert!(!text.contains(waits), "{}: {waits}", path.display());
+        }
+    }
+    assert!(n_files > 20, "{n_files} files only");
+}

@@ -6,6 +6,7 @@ mod accuracy;
 mod architecture;
 mod bad_input;
 mod docs;
+mod fast_path;
 mod p_method;
 mod scenes;
 mod verify;

@@ -5,11 +5,12 @@
 //! ```text
 //! S += |motion of the tool's surface near the part| + Σ_j max_i≠j ‖C_ij‖ |f_j - f_j,then|
 //! ```
-//! both of them bounds, not estimates; a candidate whose own force changes is always looked at. Any other found at a distance d > reach cannot be nearer than `reach`
-//! before S has grown by d - reach, because a signed distance changes by no more than point and surface
-//! move: that is when it is looked at again. Those that are far wait in a heap; those that may come near within some steps
-//! are kept in a list of their own. The cost of a step goes with the candidates near the tool, not with
-//! their number, and there is no step in which many are looked at at once, but the first.
+//! both of them bounds, not estimates. Any node but those whose own force changes, which are always looked
+//! at, found at a distance d > reach cannot be nearer than `reach` before S has grown by d - reach, because a
+//! signed distance changes by no more than point and surface move: that is when it is looked at again. Those that
+//! are far wait in a heap; those that may come near within some steps are kept in a list of their own. The cost of
+//! a step then goes with the candidates near the tool, not with their number, and no step looks at many at once,
+//! but the first.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

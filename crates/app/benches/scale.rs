@@ -86,7 +86,7 @@ fn measure(part: &Arc<ContactPart>, tool: Tool, radius: f64, contacts: f64) -> M
     let settings = EngineSettings {
         contact_iterations: ContactIterations::Converged,
         displacement_tolerance: 1e-9,
-        near_distance: 0.001 * 2.0 * radius,
+        near_distance: 0.0004 * 2.0 * radius,
         max_contacts: 1024,
         lcp: contact::lcp::Settings::default(),
         max_stride: 0.02 * 2.0 * radius,

@@ -9,6 +9,7 @@
 
 mod clock;
 mod constrained;
+mod pairs;
 mod part;
 mod report;
 mod scratch;
@@ -160,6 +161,8 @@ impl Engine {
         let max_rows = engine.scratch.max_rows();
         let constrained = Constrained::new(bubbles, free, n_candidates, max_rows);
         engine.constrained = Some(Box::new(constrained));
+        // Its own operator keeps its own blocks.
+        engine.scratch.pairs = pairs::Pairs::new(n_candidates, 0);
         Ok(engine)
     }
 
@@ -231,6 +234,7 @@ impl Engine {
             part: &self.part,
             active: &self.scratch.active,
             constrained: self.constrained.as_deref(),
+            pairs: &self.scratch.pairs,
         }
     }
 
@@ -350,12 +354,14 @@ impl Engine {
             planes,
             active,
             known,
+            pairs,
             ..
         } = &mut self.scratch;
         let deformed = Deformed {
             part,
             active,
             constrained,
+            pairs,
         };
         let position_of = |candidate: u32| {
             let i = candidate as usize;
@@ -380,6 +386,7 @@ impl Engine {
             known,
             missing,
             extra,
+            pairs,
             ..
         } = &mut self.scratch;
         if !missing.is_empty() {
@@ -387,6 +394,7 @@ impl Engine {
                 part,
                 active,
                 constrained,
+                pairs,
             };
             let position_of = |candidate: u32| {
                 let i = candidate as usize;
@@ -401,6 +409,7 @@ impl Engine {
             u_before,
             w_matrix,
             q,
+            pairs,
             ..
         } = &mut self.scratch;
         report.near = planes.len() as u32;
@@ -433,7 +442,13 @@ impl Engine {
                 .map(|matrix| CouplingCompliance { matrix, reference });
             let w = &mut w_matrix[..m * m];
             let assembled = match &mut self.constrained {
-                None => delassus_into(part, planes, coupling, w),
+                None => {
+                    if pairs.ensure(planes.iter().map(|plane| plane.candidate), part) {
+                        delassus_into(&*pairs, planes, coupling, w)
+                    } else {
+                        delassus_into(part, planes, coupling, w)
+                    }
+                }
                 Some(constrained) => {
                     let candidates = planes.iter().map(|plane| plane.candidate);
                     constrained.ensure(candidates, &[], part);
@@ -476,12 +491,14 @@ impl Engine {
             u_before,
             active,
             known,
+            pairs,
             ..
         } = &mut self.scratch;
         let deformed = Deformed {
             part,
             active,
             constrained: self.constrained.as_deref(),
+            pairs,
         };
         known.forget();
         for (plane, before) in planes.iter().zip(u_before.iter()) {
@@ -520,6 +537,7 @@ fn state_of<'a>(
             part,
             active: &scratch.active,
             constrained,
+            pairs: &scratch.pairs,
         },
         tool,
         tool_pose,

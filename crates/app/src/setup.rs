@@ -199,9 +199,9 @@ fn lcp_settings(scene: &Scene) -> lcp::Settings {
 /// m. A nanometre on a part of 10 kN/m is a hundred-thousandth of a newton.
 const DISPLACEMENT_TOLERANCE: f64 = 1e-9;
 
-/// Share of the tool's size within which a node gets a plane: 10 um on a tube of 20 mm. A node that
+/// Share of the tool's size within which a node gets a plane: 4 um on a tube of 20 mm. A node that
 /// comes in from farther away gets its plane one pass later; fewer rows save more than that costs.
-const NEAR_SHARE: f64 = 0.001;
+const NEAR_SHARE: f64 = 0.0004;
 
 /// Share of the tool's size that the tool moves in one go.
 const STRIDE_SHARE: f64 = 0.02;

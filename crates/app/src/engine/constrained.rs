@@ -20,17 +20,16 @@
 //! the coarse space is the usual one of hierarchical bases (Szabo and Babuska 1991).
 
 mod operator;
-mod pairs;
 
 use std::time::Instant;
 
 use contact::delassus::ComplianceBlocks;
 use glam::{DMat3, DVec3};
 
+use super::pairs::Pairs;
 use super::{ActiveContact, ContactPart};
 use crate::free_nodes::{FreeNodes, Rule};
 use operator::{FreeOperator, dot};
-use pairs::Pairs;
 
 /// Steps in which every bubble is looked at once: at 1 kHz one picture of the display.
 const SWEEP: usize = 16;

@@ -6,6 +6,7 @@ use glam::{DMat3, DVec3};
 
 use super::ActiveContact;
 use super::constrained::Constrained;
+use super::pairs::Pairs;
 
 /// Candidate nodes and the compliance of the part as the step reads it.
 #[derive(Debug)]
@@ -117,6 +118,8 @@ pub(super) struct Deformed<'a> {
     pub(super) active: &'a [ActiveContact],
     /// Where interface nodes are constrained, `part` is the coarse one.
     pub(super) constrained: Option<&'a Constrained>,
+    /// Blocks that lie side by side; of the part alone, not used where it is constrained.
+    pub(super) pairs: &'a Pairs,
 }
 
 impl Deformed<'_> {
@@ -124,7 +127,11 @@ impl Deformed<'_> {
     #[inline]
     pub(super) fn displacement(&self, i: usize) -> DVec3 {
         match self.constrained {
-            None => self.part.displacement(i, self.active),
+            None => {
+                let kept = self.pairs.slot(i as u32);
+                kept.and_then(|slot| self.pairs.displacement(slot, self.active))
+                    .unwrap_or_else(|| self.part.displacement(i, self.active))
+            }
             Some(constrained) => constrained.displacement(i, self.part, self.active),
         }
     }

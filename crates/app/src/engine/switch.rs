@@ -49,6 +49,7 @@ impl Engine {
             part: &self.part,
             active: &scratch.active,
             constrained: Some(constrained),
+            pairs: &scratch.pairs,
         };
         let largest = scratch
             .active

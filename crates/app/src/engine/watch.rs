@@ -316,6 +316,7 @@ mod tests {
     use contact::tool::Sphere;
 
     use super::super::ActiveContact;
+    use super::super::pairs::Pairs;
     use super::*;
 
     /// Nodes on a grid, each on its own spring of 1000 N/m; a sphere and forces wander at random.
@@ -344,6 +345,7 @@ mod tests {
         let mut pose = DPose3::from_translation(DVec3::new(5e-3, 5e-3, 2.5e-3));
         let (mut near_seen, mut n_looks) = (0, 0);
         let mut forces = vec![DVec3::ZERO; n];
+        let pairs = Pairs::new(n, 0);
         for _ in 0..3000 {
             pose.translation += 4e-4 * DVec3::new(random(), random(), 0.2 * random());
             pose.translation = pose
@@ -376,6 +378,7 @@ mod tests {
                     part: &part,
                     active: &active,
                     constrained: None,
+                    pairs: &pairs,
                 },
                 tool: &tool,
                 tool_pose: &pose,

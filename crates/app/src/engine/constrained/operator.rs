@@ -3,8 +3,8 @@
 
 use glam::{DMat3, DVec3};
 
+use super::super::pairs::Pairs;
 use super::BubbleData;
-use super::pairs::Pairs;
 use crate::engine::ActiveContact;
 
 /// Σ_FF = L Lᵀ for the free bubbles F, appended row by row; memory for `max_free` of them.

@@ -17,7 +17,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use contact::tool::{Mesh, Sphere, Tool};
+use contact::tool::{DistanceField, Mesh, Sphere, Tool};
 use glam::DVec3;
 use glamx::DPose3;
 use snapin::engine::{ContactIterations, ContactPart, Engine, EngineSettings, Stage};
@@ -227,7 +227,13 @@ fn main() {
         let (vertices, triangles) = sphere_mesh(0.03, rings);
         let n = triangles.len();
         let tool = Tool::Mesh(Mesh::new(&vertices, &triangles).unwrap().into());
-        text += &row(n.to_string(), &measure(&part, tool, 0.03, 62.0));
+        text += &row(n.to_string(), &measure(&part, tool.clone(), 0.03, 62.0));
+        if rings == 224 {
+            // As a scene's tool.field_error = 1 um.
+            let field = DistanceField::new(tool, 1e-6, 6e-4, 1 << 30).unwrap();
+            let m = measure(&part, Tool::Field(field.into()), 0.03, 62.0);
+            text += &row(format!("{n}, field to 1 µm"), &m);
+        }
     }
     println!("{text}");
     if std::env::var_os("SNAPIN_WRITE_DOCS").is_some() {

@@ -127,7 +127,8 @@ impl Engine {
             },
             watch: Watch::new(
                 &part,
-                settings.near_distance,
+                // Distances of two looks may each be wrong.
+                settings.near_distance + 2.0 * tool.error_bound(),
                 WATCH_SLACK * settings.near_distance,
             )?,
             scratch,

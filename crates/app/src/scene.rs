@@ -234,7 +234,18 @@ pub enum ToolShape {
         line: usize,
         /// Factor from the file's coordinates to m.
         scale: f64,
+        /// Distance field to be computed at load.
+        field: Option<FieldOf>,
     },
+}
+
+/// A distance field that a scene asks for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FieldOf {
+    /// Bound on the error of its distances, m.
+    pub error: f64,
+    /// Line in the scene file, for messages.
+    pub line: usize,
 }
 
 /// What the hand holds.

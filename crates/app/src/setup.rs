@@ -5,12 +5,16 @@ use std::path::Path;
 use std::sync::Arc;
 
 use contact::lcp;
-use contact::tool::{BoxShape, Capsule, Cylinder, HalfSpace, Mesh as ToolMesh, Sphere, Tool};
+use contact::tool::{
+    BoxShape, Capsule, Cylinder, DistanceField, HalfSpace, Mesh as ToolMesh, Sphere, Tool,
+};
 use device::{HandSettings, VirtualCoupling};
 use fem::{Material, Quadrature};
 
 use crate::Error;
 use crate::engine::{ContactIterations, Engine, EngineSettings, FreeSettings};
+use crate::machine::Machine;
+use crate::prepare::budget::bytes;
 use crate::prepare::{BubbleReach, GroupRef, PartSpec, PreparedPart};
 use crate::scene::{self, Adaptive, FreeNodes, PMethod, QuadratureRule, Scene, ToolShape};
 use crate::session::{Holds, SessionSpec, part_extent};
@@ -84,7 +88,19 @@ pub fn tool(scene: &Scene) -> Result<(Tool, Vec<String>), Error> {
             .map(Tool::Capsule)
             .map_err(in_scene)?,
         ToolShape::HalfSpace => Tool::HalfSpace(HalfSpace),
-        ToolShape::Mesh { file, line, scale } => return tool_mesh(scene, file, *line, *scale),
+        ToolShape::Mesh {
+            file,
+            line,
+            scale,
+            field,
+        } => {
+            let (tool, mut remarks) = tool_mesh(scene, file, *line, *scale)?;
+            let tool = match field {
+                Some(field) => with_field(scene, tool, *field, &mut remarks)?,
+                None => tool,
+            };
+            return Ok((tool, remarks));
+        }
     };
     Ok((tool, Vec::new()))
 }
@@ -124,6 +140,37 @@ fn tool_mesh(
         .map(|(n, what)| format!("{}: {n} {what}", file.display()))
         .collect();
     Ok((Tool::Mesh(Arc::new(mesh)), remarks))
+}
+
+/// The tool behind a distance field, with a remark on what it holds.
+fn with_field(
+    scene: &Scene,
+    tool: Tool,
+    field: scene::FieldOf,
+    remarks: &mut Vec<String>,
+) -> Result<Tool, Error> {
+    /// Of the tool's size, the distance at which the field still answers; beyond, a node is asked for once in
+    /// many steps.
+    const BAND_SHARE: f64 = 0.02;
+    /// Of the memory that is free.
+    const MEMORY_SHARE: f64 = 0.25;
+    let band = (BAND_SHARE * tool.characteristic_size()).max(4.0 * field.error);
+    let max_bytes = MEMORY_SHARE * Machine::read().available_memory as f64;
+    let built = DistanceField::new(tool, field.error, band, max_bytes as usize).map_err(|e| {
+        Error::Input(format!(
+            "{}:{}: tool.field_error: {e}",
+            scene.path.display(),
+            field.line
+        ))
+    })?;
+    remarks.push(format!(
+        "distance field of the tool: {} in {} cells, {:.1} % of which ask the mesh; wrong by {:e} m at most",
+        bytes(built.bytes() as f64),
+        built.n_cells(),
+        100.0 * built.exact_share(),
+        built.error_bound(),
+    ));
+    Ok(Tool::Field(Arc::new(built)))
 }
 
 /// The engine of a scene.

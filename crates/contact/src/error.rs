@@ -141,6 +141,31 @@ pub enum Error {
     /// A closed mesh that encloses nothing.
     #[error("tool mesh encloses no volume; it needs an inside")]
     MeshNoVolume,
+    /// A distance field of a tool without an end.
+    #[error(
+        "a half-space and an infinite cylinder have no distance field; use them as they are, they answer fast"
+    )]
+    FieldUnbounded,
+    /// A distance field that would not know in from out anywhere in its band.
+    #[error(
+        "the distance field's error of {error} m exceeds its band of {band} m; ask for a smaller error or a wider band"
+    )]
+    FieldErrorAboveBand {
+        /// Wanted bound of the error, m.
+        error: f64,
+        /// Half width of the band, m.
+        band: f64,
+    },
+    /// A distance field larger than allowed.
+    #[error(
+        "the distance field needs about {bytes} bytes, {max_bytes} are allowed; accept a larger error or a narrower band"
+    )]
+    FieldMemory {
+        /// What the whole would take: counted or, where the build was stopped, taken on from the part that was made.
+        bytes: usize,
+        /// What is allowed.
+        max_bytes: usize,
+    },
 }
 
 pub(crate) fn check_positive(what: &'static str, value: f64) -> Result<f64, Error> {

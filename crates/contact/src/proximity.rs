@@ -63,7 +63,8 @@ impl NodeTree {
     /// Nodes whose rest position has a signed distance to the tool below `inflate`, ascending; replaces `near`.
     ///
     /// `inflate` (m) = margin + bound on the displacement of any node: then no node that is nearer than the margin in its
-    /// displaced position is missed, because a signed distance changes by no more than the point moves.
+    /// displaced position is missed, because a signed distance changes by no more than the point moves. A
+    /// [`Tool::Field`] keeps that within its error bound: add it to the margin.
     /// Does not allocate if `near` has a capacity of [`NodeTree::len`].
     pub fn near_into(
         &self,
@@ -77,8 +78,9 @@ impl NodeTree {
             .unwrap_or((DVec3::NEG_INFINITY, DVec3::INFINITY));
         let (min, max) = (min - DVec3::splat(inflate), max + DVec3::splat(inflate));
         let distance = |p| tool.signed_distance(pose_part_tool, p).signed_distance;
-        // A mesh answers slowly, its box alone prunes well; the others cost less than a visit.
-        let is_cheap = !matches!(tool, Tool::Mesh(_));
+        // A mesh answers slowly, and so does a field far from its surface: the box alone prunes well. The others cost
+        // less than a visit.
+        let is_cheap = !matches!(tool, Tool::Mesh(_) | Tool::Field(_));
         self.collect(near, |node_min, node_max, is_leaf| {
             let overlaps = node_min.cmple(max).all() && node_max.cmpge(min).all();
             if !overlaps || is_leaf || !is_cheap {
@@ -114,11 +116,21 @@ impl NodeTree {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::{Arc, LazyLock};
+
     use glam::DQuat;
     use proptest::prelude::*;
 
     use super::*;
-    use crate::tool::{BoxShape, Capsule, Cylinder, HalfSpace, Mesh, Sphere};
+    use crate::tool::{BoxShape, Capsule, Cylinder, DistanceField, HalfSpace, Mesh, Sphere};
+
+    /// Made once: the build takes longer than the queries.
+    static FIELD: LazyLock<Arc<DistanceField>> = LazyLock::new(|| {
+        let brick = Tool::Box(BoxShape::new(DVec3::new(0.3, 0.5, 0.2)).unwrap());
+        DistanceField::new(brick, 2e-3, 0.1, 1 << 30)
+            .unwrap()
+            .into()
+    });
 
     fn tools() -> Vec<Tool> {
         let brick = Tool::Box(BoxShape::new(DVec3::new(0.3, 0.5, 0.2)).unwrap());
@@ -130,6 +142,7 @@ mod tests {
             Tool::Capsule(Capsule::new(0.2, 0.4).unwrap()),
             Tool::HalfSpace(HalfSpace),
             Tool::Mesh(Mesh::new(&vertices, &triangles).unwrap().into()),
+            Tool::Field(Arc::clone(&FIELD)),
             brick,
         ]
     }

@@ -1,4 +1,4 @@
-//! Rigid tools: exact signed distance and outward normal of a shape.
+//! Rigid tools: exact signed distance and outward normal of a shape; of a [`DistanceField`] within its bound.
 //!
 //! Every shape answers in its own frame, `signed_distance_local`; [`Tool`] brings a point of the part's frame there and
 //! the normal back. On the medial axis, where the nearest surface point is not unique, one of the nearest is taken
@@ -7,6 +7,7 @@
 mod box_shape;
 mod capsule;
 mod cylinder;
+mod field;
 mod half_space;
 mod mesh;
 mod sphere;
@@ -20,6 +21,7 @@ use glamx::DPose3;
 pub use box_shape::BoxShape;
 pub use capsule::Capsule;
 pub use cylinder::Cylinder;
+pub use field::DistanceField;
 pub use half_space::HalfSpace;
 pub use mesh::{Mesh, MeshRepair};
 pub use sphere::Sphere;
@@ -48,6 +50,8 @@ pub enum Tool {
     HalfSpace(HalfSpace),
     /// Closed triangle mesh.
     Mesh(Arc<Mesh>),
+    /// Any bounded tool, interpolated from distances computed before.
+    Field(Arc<DistanceField>),
 }
 
 impl Tool {
@@ -72,6 +76,7 @@ impl Tool {
             Self::Capsule(shape) => shape.signed_distance_local(point),
             Self::HalfSpace(shape) => shape.signed_distance_local(point),
             Self::Mesh(shape) => shape.signed_distance_local(point),
+            Self::Field(field) => field.signed_distance_local(point),
         }
     }
 
@@ -86,9 +91,18 @@ impl Tool {
             Self::Capsule(shape) => (DVec3::ZERO, shape.half_extents(rotation.z_axis)),
             Self::HalfSpace(_) => return None,
             Self::Mesh(shape) => shape.center_and_half_extents(&rotation),
+            Self::Field(field) => return field.tool().aabb(pose_part_tool),
         };
         let center = pose_part_tool.transform_point(center);
         Some((center - half, center + half))
+    }
+
+    /// How much a signed distance may be wrong, m: nothing but for a [`DistanceField`].
+    pub fn error_bound(&self) -> f64 {
+        match self {
+            Self::Field(field) => field.error_bound(),
+            _ => 0.0,
+        }
     }
 
     /// Size of the smallest feature that a motion must not step over, m: radius or smallest half extent. Infinite for
@@ -101,6 +115,7 @@ impl Tool {
             Self::Capsule(shape) => shape.radius(),
             Self::HalfSpace(_) => f64::INFINITY,
             Self::Mesh(shape) => shape.characteristic_size(),
+            Self::Field(field) => field.tool().characteristic_size(),
         }
     }
 
@@ -115,6 +130,7 @@ impl Tool {
             Self::Capsule(shape) => shape.tessellate(),
             Self::HalfSpace(shape) => shape.tessellate(extent),
             Self::Mesh(shape) => shape.tessellate(),
+            Self::Field(field) => field.tool().tessellate(extent),
         }
     }
 }

@@ -14,7 +14,7 @@ use contact::glamx::DPose3;
 use contact::lcp::{Problem, Scratch, Settings, Start, solve};
 use contact::plane::planes_into;
 use contact::proximity::NodeTree;
-use contact::tool::{BoxShape, Capsule, Cylinder, HalfSpace, Mesh, Sphere, Tool};
+use contact::tool::{BoxShape, Capsule, Cylinder, DistanceField, HalfSpace, Mesh, Sphere, Tool};
 
 thread_local! {
     static N_ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
@@ -140,6 +140,7 @@ impl ComplianceBlocks for Blocks {
 fn proximity_planes_and_delassus_allocate_nothing() {
     let brick = Tool::Box(BoxShape::new(DVec3::new(0.3, 0.5, 0.2)).unwrap());
     let (vertices, triangles) = Tool::Sphere(Sphere::new(0.4).unwrap()).tessellate(1.0);
+    let field = DistanceField::new(brick.clone(), 2e-3, 0.1, 1 << 30).unwrap();
     let tools = [
         Tool::Sphere(Sphere::new(0.4).unwrap()),
         Tool::Cylinder(Cylinder::new(0.3, Some(0.5)).unwrap()),
@@ -147,6 +148,7 @@ fn proximity_planes_and_delassus_allocate_nothing() {
         Tool::Capsule(Capsule::new(0.2, 0.4).unwrap()),
         Tool::HalfSpace(HalfSpace),
         Tool::Mesh(Mesh::new(&vertices, &triangles).unwrap().into()),
+        Tool::Field(field.into()),
         brick,
     ];
     let nodes: Vec<DVec3> = (0..5000)

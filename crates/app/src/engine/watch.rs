@@ -294,7 +294,7 @@ impl Watch {
 fn distance_bound(state: State<'_>, candidate: usize) -> f64 {
     let rest = state.deformed.part.rest_positions()[candidate];
     let position = rest + state.deformed.displacement(candidate);
-    if let Tool::Mesh(_) = state.tool
+    if let Tool::Mesh(_) | Tool::Field(_) = state.tool
         && let Some((min, max)) = state.tool.aabb(state.tool_pose)
     {
         let outside = (min - position)

@@ -88,7 +88,10 @@ impl Story<'_> {
                 )
             }
             ToolShape::HalfSpace => "half-space".to_owned(),
-            ToolShape::Mesh { file, .. } => file.display().to_string(),
+            ToolShape::Mesh { file, field, .. } => {
+                let field = field.map(|f| format!(", distances within {:e} m", f.error));
+                format!("{}{}", file.display(), field.unwrap_or_default())
+            }
         };
         let pair = |label: &str, value: String| (label.to_owned(), value);
         vec![

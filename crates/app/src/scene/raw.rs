@@ -402,6 +402,10 @@ pub(super) struct ToolRaw {
     /// Factor from the coordinates of `file` to the scene's length unit, above 0.
     #[schemars(extend("x-quantity" = "number", "default" = 1.0))]
     pub(super) scale: Option<At<f64>>,
+    /// Distances to a mesh are interpolated from a field that is computed at load, wrong by no more than this, above
+    /// 0. For meshes of very many triangles; without it the mesh itself is asked.
+    #[schemars(extend("x-quantity" = "length", "x-default" = "no field"))]
+    pub(super) field_error: Option<At<f64>>,
     /// Where the tool's origin starts, in the part's frame.
     #[schemars(extend("x-quantity" = "length"))]
     pub(super) position: At<Vector<3>>,

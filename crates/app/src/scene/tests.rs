@@ -218,14 +218,22 @@ fn tool_shapes_take_their_own_keys() {
             half_length: 2.0
         }
     );
-    let ToolShape::Mesh { file, line, scale } =
-        parsed("shape = \"mesh\"\nfile = \"tool.stl\"\nscale = 0.001")
+    let ToolShape::Mesh {
+        file,
+        line,
+        scale,
+        field,
+    } = parsed("shape = \"mesh\"\nfile = \"tool.stl\"\nscale = 0.001\nfield_error = 1e-6")
     else {
         panic!("mesh")
     };
     assert_eq!(
         (file.file_name().unwrap().to_str(), line, scale),
         (Some("tool.stl"), 14, 1e-3)
+    );
+    assert_eq!(
+        field.map(|field| (field.error, field.line)),
+        Some((1e-6, 16))
     );
 }
 

@@ -11,8 +11,8 @@ use super::error::{SceneError, line_of, plain};
 use super::raw::{self, At, EffectRaw, ShapeRaw, Vector, default};
 use super::units::{Quantity, to_si};
 use super::{
-    Coupling, Device, EffectChoice, Effects, Fixed, GroupName, Hand, Handbook, Material, Output,
-    Part, Scene, Tool, ToolShape, Units,
+    Coupling, Device, EffectChoice, Effects, FieldOf, Fixed, GroupName, Hand, Handbook, Material,
+    Output, Part, Scene, Tool, ToolShape, Units,
 };
 
 /// Servo periods in one run: 10 000 s at 1 kHz. More is a slip of the units, and would fill disks.
@@ -302,7 +302,7 @@ impl Check<'_> {
             ShapeRaw::Box => ("box", &["half_extents"]),
             ShapeRaw::Capsule => ("capsule", &["radius", "half_length"]),
             ShapeRaw::HalfSpace => ("half-space", &[]),
-            ShapeRaw::Mesh => ("mesh", &["file", "scale"]),
+            ShapeRaw::Mesh => ("mesh", &["file", "scale", "field_error"]),
         };
         let written = [
             ("radius", raw.radius.as_ref().map(|at| at.offset)),
@@ -313,6 +313,7 @@ impl Check<'_> {
             ),
             ("file", raw.file.as_ref().map(|at| at.offset)),
             ("scale", raw.scale.as_ref().map(|at| at.offset)),
+            ("field_error", raw.field_error.as_ref().map(|at| at.offset)),
         ];
         for (key, offset) in written {
             if let Some(offset) = offset.filter(|_| !keys.contains(&key)) {
@@ -392,10 +393,16 @@ impl Check<'_> {
             Quantity::Length,
             Range::Positive,
         )?;
+        let field = raw.field_error.as_ref().map(|at| {
+            let error = self.number("field_error", at, Quantity::Length, Range::Positive)?;
+            let line = line_of(self.source, at.offset);
+            Ok(FieldOf { error, line })
+        });
         Ok(ToolShape::Mesh {
             file,
             line: line_of(self.source, at.offset),
             scale,
+            field: field.transpose()?,
         })
     }
 

@@ -38,7 +38,9 @@ pub(super) fn identity(scene: &Scene) -> Result<String, Error> {
     let contact: Vec<_> = scene.part.contact.iter().map(|g| &g.name).collect();
     let material = &scene.part.material;
     let shape = match &scene.tool.shape {
-        crate::scene::ToolShape::Mesh { scale, .. } => format!("mesh {scale}"),
+        crate::scene::ToolShape::Mesh { scale, field, .. } => {
+            format!("mesh {scale} {:?}", field.map(|field| field.error))
+        }
         shape => format!("{shape:?}"),
     };
     let rest = format!(

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use glamx::DPose3;
 use snapin::prepare::{PrepareOptions, prepare};
 use snapin::progress::Ui;
-use snapin::scene::{Adaptive, FreeNodes, PMethod, Scene};
+use snapin::scene::{Adaptive, Columns, FreeNodes, PMethod, Scalar, Scene};
 use snapin::setup;
 use snapin::shape::Shape;
 use snapin_tests::root;
@@ -42,18 +42,26 @@ unsafe impl GlobalAlloc for Counting {
 static ALLOCATOR: Counting = Counting;
 
 /// Both scenes, pushed in and pulled out again, a jump of the handle and a pose that is refused; the
-/// clip also with free nodes chosen, built and blended in on the way, and its shape drawn.
+/// clip also with 32-bit numbers, with most of its columns missing, and with free nodes chosen, built and blended in on
+/// the way, and its shape drawn.
 #[test]
 fn no_step_of_an_insertion_allocates() {
     let on = |method, free| Adaptive::On { method, free };
-    for (name, adaptive) in [
-        ("clip.toml", Adaptive::Off),
-        ("hook.toml", Adaptive::Off),
-        ("clip.toml", on(PMethod::Select, FreeNodes::Indicator(1e-3))),
-        ("clip.toml", on(PMethod::Constrain, FreeNodes::Radius(3e-3))),
+    let all = (Columns::All, Scalar::F64);
+    let bent = on(PMethod::Select, FreeNodes::Indicator(1e-3));
+    let constrained = on(PMethod::Constrain, FreeNodes::Radius(3e-3));
+    for (name, adaptive, (columns, contact_scalar)) in [
+        ("clip.toml", Adaptive::Off, all),
+        ("clip.toml", Adaptive::Off, (Columns::All, Scalar::F32)),
+        ("clip.toml", Adaptive::Off, (Columns::Near, Scalar::F32)),
+        ("hook.toml", Adaptive::Off, all),
+        ("clip.toml", bent, all),
+        ("clip.toml", constrained, all),
     ] {
         let mut scene = Scene::load(&root().join("scenes").join(name)).unwrap();
         scene.accuracy.adaptive = adaptive;
+        scene.accuracy.columns = columns;
+        scene.accuracy.contact_scalar = contact_scalar;
         let mut unseen = std::io::sink();
         let ui = Ui::new(&mut unseen, false);
         let prepared = prepare(
@@ -83,6 +91,6 @@ fn no_step_of_an_insertion_allocates() {
         }
         let after = ALLOCATIONS.load(Ordering::Relaxed);
         assert!(touched > 100, "{name}: contact in {touched} steps only");
-        assert_eq!(after - before, 0, "{name} {adaptive:?}");
+        assert_eq!(after - before, 0, "{name} {adaptive:?} {columns:?}");
     }
 }

@@ -125,8 +125,8 @@ fn main() {
 fn multiply_times(clip: &mut Clip) -> Vec<u64> {
     let loaded = &clip.prepared.loaded;
     let layout = gpu::Layout::new(loaded.rows.len(), loaded.candidates.len()).unwrap();
-    let mut multiply =
-        gpu::on_cpu(layout, &clip.prepared.compliance.blocks, gpu::Scalar::F64).unwrap();
+    let whole = clip.prepared.compliance.all().unwrap();
+    let mut multiply = gpu::on_cpu(layout, &whole.stretches(), gpu::Scalar::F64).unwrap();
     clip.engine.reset();
     for step in 0..=STEPS / 4 {
         let target = clip.target(step);

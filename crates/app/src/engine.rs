@@ -9,6 +9,7 @@
 
 mod clock;
 mod constrained;
+mod late;
 mod pairs;
 mod part;
 mod report;
@@ -31,6 +32,7 @@ use crate::free_nodes::LOOSE_RADIUS;
 use clock::StageClock;
 use constrained::Constrained;
 pub use constrained::{BubbleData, FreeSettings, MOST_FREE};
+use late::Late;
 pub use part::ContactPart;
 use part::Deformed;
 pub use report::{ActiveContact, N_STAGES, Stage, StepReport};
@@ -99,6 +101,8 @@ pub struct Engine {
     last_wrench: [f64; 6],
     /// The p-method by Galerkin, where the scene asks for it.
     constrained: Option<Box<Constrained>>,
+    /// Where columns are fetched.
+    late: Option<Late>,
 }
 
 impl Engine {
@@ -136,6 +140,7 @@ impl Engine {
             deviation: [0.0; 6],
             last_wrench: [0.0; 6],
             constrained: None,
+            late: part.is_fetched().then(|| Late::new(max_contacts)),
             part,
             tool,
         })
@@ -203,6 +208,9 @@ impl Engine {
         if let Some(constrained) = &mut self.constrained {
             constrained.reset();
         }
+        if let Some(late) = &mut self.late {
+            late.clear();
+        }
     }
 
     /// Contacts that carry force after the last step.
@@ -254,6 +262,9 @@ impl Engine {
             return report;
         }
         self.switch_free_nodes(&mut report);
+        if let Some(late) = &mut self.late {
+            late.begin_step(&self.part);
+        }
         let from = self.last_target.unwrap_or(*target);
         let motion = (target.translation - from.translation).length()
             + self.reach_of_rotation * from.rotation.angle_between(target.rotation);
@@ -405,6 +416,9 @@ impl Engine {
             planes_into(tool, &pose, missing, position_of, f64::INFINITY, extra);
         }
         self.scratch.keep_seen();
+        if let Some(late) = &mut self.late {
+            report.without_column = late.sort_out(&mut self.scratch.planes, part) as u32;
+        }
         let Scratch {
             planes,
             u_before,

@@ -13,6 +13,7 @@ pub mod engine;
 mod error;
 mod evaluate;
 pub mod fields;
+mod follow;
 mod free_nodes;
 pub mod interrupt;
 pub mod machine;
@@ -24,6 +25,7 @@ pub mod scene;
 pub mod session;
 pub mod setup;
 pub mod shape;
+pub mod stored;
 pub mod study;
 
 pub use cli::run;

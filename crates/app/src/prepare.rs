@@ -7,8 +7,10 @@
 mod bubbles;
 pub mod budget;
 pub mod cache;
+mod demand;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 use fem::{
@@ -16,11 +18,14 @@ use fem::{
     Quadrature, Supports,
 };
 use glam::DVec3;
+use gpu::Scalar;
 
 use crate::Error;
 use crate::engine::{BubbleData, ContactPart};
 use crate::progress::Ui;
+use crate::stored::{Blocks, Source, StoredCompliance};
 use budget::Forecast;
+pub use demand::Demand;
 
 /// A physical group and who asks for it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -52,6 +57,49 @@ pub struct PartSpec {
     pub quadrature: Quadrature,
     /// Which interface nodes may be freed in a constrained part; `None`: nothing is constrained.
     pub bubbles: Option<BubbleReach>,
+    /// Which columns of the compliance are there from the start.
+    pub columns: ColumnChoice,
+    /// Numbers in which the compliance between candidates is kept for the step.
+    pub contact_scalar: Scalar,
+}
+
+/// Which columns of the compliance are there from the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ColumnChoice {
+    /// All if they fit into memory, those near the tool otherwise.
+    #[default]
+    Auto,
+    /// All.
+    All,
+    /// Some; the others are fetched when the tool comes near.
+    Near,
+}
+
+/// The compliance of a part.
+#[derive(Debug)]
+pub enum PreparedCompliance {
+    /// Every candidate's column.
+    All(StoredCompliance),
+    /// Columns that are fetched when the tool comes near.
+    Near(Arc<Demand>),
+}
+
+impl PreparedCompliance {
+    /// Memory, bytes.
+    pub fn bytes(&self) -> f64 {
+        match self {
+            Self::All(stored) => stored.bytes() as f64,
+            Self::Near(demand) => demand.bytes(),
+        }
+    }
+
+    /// The whole, if it is there.
+    pub fn all(&self) -> Option<&StoredCompliance> {
+        match self {
+            Self::All(stored) => Some(stored),
+            Self::Near(_) => None,
+        }
+    }
 }
 
 /// Which interface nodes may be freed while a constrained part is touched.
@@ -96,7 +144,7 @@ pub struct PreparedPart {
     /// Mesh, supports and who can touch.
     pub loaded: LoadedPart,
     /// Surface displacement per force on the nodes that can touch.
-    pub compliance: Compliance,
+    pub compliance: PreparedCompliance,
     /// What was checked after the build.
     pub checks: ComplianceChecks,
     /// The constrained part, where it is asked for.
@@ -120,11 +168,16 @@ impl PreparedPart {
         let of_bubbles = self.bubbles.as_ref().map_or(0.0, |b| {
             BubbleCompliance::bytes(b.candidates.len(), b.rows.len(), b.bubbles.len())
         });
-        8.0 * self.compliance.blocks.len() as f64 + of_bubbles
+        self.compliance.bytes() + of_bubbles
     }
 
-    /// What the engine needs of the part with constrained interface nodes.
-    pub fn constrained_part(&self, bubbles: &BubbleCompliance) -> (ContactPart, BubbleData) {
+    /// What the engine needs of the part with constrained interface nodes; `whole`: the compliance of the part
+    /// without constraints.
+    pub fn constrained_part(
+        &self,
+        bubbles: &BubbleCompliance,
+        whole: &StoredCompliance,
+    ) -> (ContactPart, BubbleData) {
         let at = |node: &u32| DVec3::from_array(self.loaded.mesh.nodes[*node as usize]);
         let (n_rows, n_bubbles) = (bubbles.rows.len(), bubbles.bubbles.len());
         let n_candidates = bubbles.candidates.len();
@@ -139,7 +192,7 @@ impl PreparedPart {
         // A block off the diagonal of a positive definite matrix is no larger than the geometric
         // mean of its two diagonal blocks; constrained parts are stiffer than the whole one.
         let norms: Vec<f64> = (0..n_candidates)
-            .map(|i| self.compliance.block(i, i).iter().map(|c| c * c).sum())
+            .map(|i| whole.block(i, i).iter().map(|c| c * c).sum())
             .map(f64::sqrt)
             .collect();
         let largest = norms.iter().copied().fold(0.0, f64::max);
@@ -153,19 +206,23 @@ impl PreparedPart {
         (ContactPart::new(rest, n_rows, bubbles.coarse.clone()), data)
     }
 
-    /// What the engine needs of the part.
-    pub fn contact_part(&self) -> ContactPart {
-        let rest = self
-            .compliance
+    /// What the engine needs of the part. Shares the compliance unless it is rounded to 32 bits.
+    pub fn contact_part(&self) -> Arc<ContactPart> {
+        let stored = match &self.compliance {
+            PreparedCompliance::All(stored) => stored,
+            PreparedCompliance::Near(demand) => return Arc::clone(demand.part()),
+        };
+        let rest: Vec<DVec3> = self
+            .loaded
             .candidates
             .iter()
             .map(|&node| DVec3::from_array(self.loaded.mesh.nodes[node as usize]))
             .collect();
-        ContactPart::new(
-            rest,
-            self.compliance.rows.len(),
-            self.compliance.blocks.clone(),
-        )
+        let blocks = match self.loaded.spec.contact_scalar {
+            Scalar::F64 => Blocks::F64(Source::Shared(Arc::clone(stored.contact()))),
+            Scalar::F32 => Blocks::rounded(stored.contact()),
+        };
+        Arc::new(ContactPart::with_all(rest, stored.n_candidates(), blocks))
     }
 }
 
@@ -301,13 +358,17 @@ enum Cached {
     No,
 }
 
-/// The compliance from the cache, or built and kept.
+/// The compliance from the cache, or built and kept; or as much of it as is there from the start.
 fn compliance_of(
     loaded: &LoadedPart,
     options: &PrepareOptions,
     ui: &Ui<'_>,
     seconds: &mut Vec<(&'static str, f64)>,
-) -> Result<(Compliance, ComplianceChecks, Cached), Error> {
+) -> Result<(PreparedCompliance, ComplianceChecks, Cached), Error> {
+    let forecast = Forecast::of(loaded);
+    if forecast.fetches_columns(loaded) {
+        return fetched(loaded, &forecast, ui, seconds);
+    }
     let key = cache_key(loaded);
     let cache_file = options
         .cache_dir
@@ -315,9 +376,10 @@ fn compliance_of(
         .map(|dir| cache::file_of(dir, &loaded.spec.mesh_path, &key));
     if let (Some(file), false) = (&cache_file, options.rebuild) {
         let reading = Instant::now();
-        match cache::read(file, &key, &loaded.candidates, &loaded.rows) {
+        match cache::read(file, &key, loaded.candidates.len(), loaded.rows.len()) {
             Ok(Some((compliance, checks))) => {
                 seconds.push(("read the cache", reading.elapsed().as_secs_f64()));
+                let compliance = PreparedCompliance::All(compliance);
                 return Ok((compliance, checks, Cached::Read(file.clone())));
             }
             Ok(None) => {}
@@ -330,7 +392,6 @@ fn compliance_of(
         }
     }
 
-    let forecast = Forecast::of(loaded);
     ui.note(&forecast.line(loaded));
     forecast.refuse_what_cannot_fit(loaded)?;
 
@@ -339,7 +400,14 @@ fn compliance_of(
     let mut cached = Cached::No;
     if let Some(file) = cache_file {
         match cache::write(&file, &key, &compliance, &checks) {
-            Ok(()) => cached = Cached::Written(file),
+            Ok(()) => {
+                // From the file on, so that large parts are in memory once and can be given back to it.
+                let read = cache::read(&file, &key, loaded.candidates.len(), loaded.rows.len());
+                cached = Cached::Written(file);
+                if let Ok(Some((mapped, checks))) = read {
+                    return Ok((PreparedCompliance::All(mapped), checks, cached));
+                }
+            }
             Err(source) => ui.note(&format!(
                 "{}: cannot keep the prepared part ({source}); the next run prepares it again \
                  (SNAPIN_CACHE names another folder)",
@@ -347,8 +415,49 @@ fn compliance_of(
             )),
         }
     }
+    let compliance = PreparedCompliance::All(StoredCompliance::new(compliance));
     Ok((compliance, checks, cached))
 }
+
+/// A part whose columns are fetched when the tool comes near. Its factor is not cached.
+fn fetched(
+    loaded: &LoadedPart,
+    forecast: &Forecast,
+    ui: &Ui<'_>,
+    seconds: &mut Vec<(&'static str, f64)>,
+) -> Result<(PreparedCompliance, ComplianceChecks, Cached), Error> {
+    let capacity = forecast.columns_that_fit(loaded)?;
+    ui.note(&forecast.fetched_line(loaded, capacity));
+    let path = &loaded.spec.mesh_path;
+    let progress = ui.progress();
+    let mut lap = Instant::now();
+    let mut done = |name| {
+        seconds.push((name, lap.elapsed().as_secs_f64()));
+        lap = Instant::now();
+    };
+    let stiffness = assemble(loaded)?;
+    done("assemble the stiffness");
+    let factor = FactoredStiffness::new(&stiffness, &loaded.supports, &progress)
+        .map_err(|e| Error::part(path, e))?;
+    done("factor");
+    // The checks of the whole, of some columns.
+    let step = loaded.candidates.len().div_ceil(SAMPLE).max(1);
+    let sample: Vec<u32> = loaded.candidates.iter().copied().step_by(step).collect();
+    let checks = Compliance::build(&factor, &sample, &sample, &progress)
+        .and_then(|compliance| compliance.check(&stiffness, &factor))
+        .map_err(|e| Error::part(path, e))?;
+    done("checks");
+    let demand = Demand::new(loaded, factor, capacity, loaded.spec.contact_scalar);
+    done("compliance columns");
+    Ok((
+        PreparedCompliance::Near(Arc::new(demand)),
+        checks,
+        Cached::No,
+    ))
+}
+
+/// Columns that are checked of a part that has not all of them.
+const SAMPLE: usize = 32;
 
 /// Stiffness of a loaded part.
 ///

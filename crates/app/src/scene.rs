@@ -344,8 +344,25 @@ pub struct Accuracy {
     pub max_contacts: usize,
     /// Number type of the displacement multiply.
     pub scalar: Scalar,
+    /// Number type in which the step reads the compliance between nodes that can touch.
+    pub contact_scalar: Scalar,
+    /// Which columns of the compliance are there from the start.
+    pub columns: Columns,
     /// Where the displacement multiply runs.
     pub multiply: Multiply,
+}
+
+/// Which columns of the compliance are there from the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Columns {
+    /// all if they fit into memory, else `"near"`.
+    #[default]
+    Auto,
+    /// all, or the part is refused.
+    All,
+    /// some; the others are fetched in the background when the tool comes near.
+    Near,
 }
 
 impl Accuracy {
@@ -361,6 +378,8 @@ impl Accuracy {
             lcp_rounds: None,
             max_contacts: raw::default::MAX_CONTACTS as usize,
             scalar: Scalar::F64,
+            contact_scalar: Scalar::F64,
+            columns: Columns::Auto,
             multiply: Multiply::Auto,
         };
         let draw = |free| Adaptive::On {
@@ -395,16 +414,18 @@ impl Accuracy {
             ContactIterations::Times(1) => "planes once".to_owned(),
             ContactIterations::Times(n) => format!("planes {n} times"),
         };
-        let scalar = match self.scalar {
+        let name = |scalar| match scalar {
             Scalar::F64 => "f64",
             Scalar::F32 => "f32",
         };
         let preset = self.preset.map(|p| format!("{}: ", p.name()));
         format!(
-            "{}{planes}, interface nodes {}, LCP to {:e}, shape in {scalar}",
+            "{}{planes}, interface nodes {}, LCP to {:e}, contact in {}, shape in {}",
             preset.unwrap_or_default(),
             self.adaptive.words(),
-            self.lcp_tolerance
+            self.lcp_tolerance,
+            name(self.contact_scalar),
+            name(self.scalar),
         )
     }
 }

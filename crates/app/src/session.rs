@@ -18,7 +18,8 @@ use glam::DVec3;
 use glamx::DPose3;
 
 use crate::engine::{ActiveContact, Engine, StepReport};
-use crate::prepare::PreparedPart;
+use crate::follow::Follower;
+use crate::prepare::{PreparedCompliance, PreparedPart};
 use crate::shape::{self, Shape};
 use crate::{Error, interrupt};
 
@@ -162,6 +163,10 @@ pub fn run(
             bubbles: Vec::new(),
         },
         shape,
+        follower: match &prepared.compliance {
+            PreparedCompliance::All(_) => None,
+            PreparedCompliance::Near(demand) => Some(Follower::new(demand, spec.real_time)),
+        },
     };
     let settings = ServoSettings::for_limits(device::HapticDevice::limits(&device));
     if spec.real_time {
@@ -180,6 +185,7 @@ struct Session<'a> {
     engine: &'a mut Engine,
     recording: Recording,
     shape: &'a mut Shape,
+    follower: Option<Follower>,
 }
 
 impl Session<'_> {
@@ -269,8 +275,12 @@ impl Session<'_> {
     /// What the display would do between two steps: the whole surface.
     fn display(&mut self) -> Result<(), Error> {
         let begun = Instant::now();
-        let largest = shape::largest(self.shape.update(self.engine)?);
+        let drawn = self.shape.update(self.engine)?;
+        let largest = shape::largest(drawn);
         let elapsed = begun.elapsed().as_nanos() as u64;
+        if let (Some(follower), Some(last)) = (&mut self.follower, self.recording.records.last()) {
+            follower.look(self.engine, last.report.tool_pose, drawn);
+        }
         self.recording.max_surface_displacement =
             self.recording.max_surface_displacement.max(largest);
         if let Some(last) = self.recording.records.last_mut() {

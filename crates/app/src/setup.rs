@@ -15,7 +15,7 @@ use crate::Error;
 use crate::engine::{ContactIterations, Engine, EngineSettings, FreeSettings};
 use crate::machine::Machine;
 use crate::prepare::budget::bytes;
-use crate::prepare::{BubbleReach, GroupRef, PartSpec, PreparedPart};
+use crate::prepare::{BubbleReach, ColumnChoice, GroupRef, PartSpec, PreparedPart};
 use crate::scene::{self, Adaptive, FreeNodes, PMethod, QuadratureRule, Scene, ToolShape};
 use crate::session::{Holds, SessionSpec, part_extent};
 
@@ -30,6 +30,8 @@ pub fn part_spec(scene: &Scene) -> Result<PartSpec, Error> {
         place: place(g.line),
     };
     let material = &scene.part.material;
+    // What draws between nodes or constrains them needs all columns.
+    let is_plain = scene.accuracy.adaptive == Adaptive::Off;
     Ok(PartSpec {
         mesh_path: scene.part.mesh.clone(),
         length_scale: scene.length_scale,
@@ -45,6 +47,12 @@ pub fn part_spec(scene: &Scene) -> Result<PartSpec, Error> {
             }),
             _ => None,
         },
+        columns: match scene.accuracy.columns {
+            scene::Columns::Auto if is_plain => ColumnChoice::Auto,
+            scene::Columns::Auto | scene::Columns::All => ColumnChoice::All,
+            scene::Columns::Near => ColumnChoice::Near,
+        },
+        contact_scalar: scalar(scene.accuracy.contact_scalar),
         material: Material::new(material.young_modulus, material.poisson_ratio)
             .map_err(|e| Error::part(&scene.path, e))?,
         fixed: scene
@@ -59,6 +67,14 @@ pub fn part_spec(scene: &Scene) -> Result<PartSpec, Error> {
             QuadratureRule::Converged => Quadrature::Converged,
         },
     })
+}
+
+/// Number type in the words of the multiply.
+pub(crate) fn scalar(scalar: scene::Scalar) -> gpu::Scalar {
+    match scalar {
+        scene::Scalar::F64 => gpu::Scalar::F64,
+        scene::Scalar::F32 => gpu::Scalar::F32,
+    }
 }
 
 /// The tool of a scene, with remarks on what was mended in its mesh.
@@ -194,15 +210,17 @@ pub fn engine(scene: &Scene, prepared: &PreparedPart, tool: Tool) -> Result<Engi
         scene.coupling.translational_stiffness,
         scene.coupling.rotational_stiffness,
     )?;
-    let engine = match (scene.accuracy.adaptive, &prepared.bubbles) {
+    let (bubbles, whole) = (&prepared.bubbles, prepared.compliance.all());
+    let engine = match (scene.accuracy.adaptive, bubbles, whole) {
         (
             Adaptive::On {
                 method: PMethod::Constrain,
                 free,
             },
             Some(bubbles),
+            Some(whole),
         ) => {
-            let (coarse, data) = prepared.constrained_part(bubbles);
+            let (coarse, data) = prepared.constrained_part(bubbles, whole);
             let rule = match free {
                 FreeNodes::Radius(radius) => FreeSettings::within(radius),
                 FreeNodes::Indicator(limit) => FreeSettings::bent_beyond(limit),
@@ -210,12 +228,7 @@ pub fn engine(scene: &Scene, prepared: &PreparedPart, tool: Tool) -> Result<Engi
             };
             Engine::constrained(coarse, data, rule, tool, Some(coupling), settings)
         }
-        _ => Engine::new(
-            Arc::new(prepared.contact_part()),
-            tool,
-            Some(coupling),
-            settings,
-        ),
+        _ => Engine::new(prepared.contact_part(), tool, Some(coupling), settings),
     };
     engine.map_err(|source| Error::Tool {
         path: scene.path.clone(),

@@ -8,12 +8,15 @@
 
 mod select;
 
+use std::sync::Arc;
+
 use gpu::{Layout, Multiply};
 
 use crate::Error;
 use crate::engine::Engine;
-use crate::prepare::PreparedPart;
-use crate::scene::{self, Accuracy, Adaptive, PMethod};
+use crate::prepare::{Demand, PreparedCompliance, PreparedPart};
+use crate::scene::{Accuracy, Adaptive, PMethod};
+use crate::setup;
 use select::Select;
 
 /// Displacement of all surface nodes, with its buffers.
@@ -26,6 +29,8 @@ pub struct Shape {
 
 enum Kind {
     Full(Box<dyn Multiply>),
+    /// From the columns that were fetched.
+    Fetched(Arc<Demand>),
     Select(Box<Select>),
     Constrained {
         coarse: Box<dyn Multiply>,
@@ -42,14 +47,22 @@ impl Shape {
     pub fn new(prepared: &PreparedPart, accuracy: &Accuracy) -> Result<Self, Error> {
         let n_candidates = prepared.loaded.candidates.len();
         let n_rows = prepared.loaded.rows.len();
-        let scalar = match accuracy.scalar {
-            scene::Scalar::F64 => gpu::Scalar::F64,
-            scene::Scalar::F32 => gpu::Scalar::F32,
-        };
-        let upload = |n_columns: usize, blocks: &[f64]| {
+        let scalar = setup::scalar(accuracy.scalar);
+        let upload = |n_columns: usize, blocks: &[&[f64]]| {
             gpu::on_cpu(Layout::new(n_rows, n_columns)?, blocks, scalar)
         };
         let mut n_columns = n_candidates;
+        let whole = match &prepared.compliance {
+            PreparedCompliance::All(stored) => stored,
+            PreparedCompliance::Near(demand) => {
+                return Ok(Self {
+                    kind: Kind::Fetched(Arc::clone(demand)),
+                    columns: Vec::new(),
+                    forces: Vec::new(),
+                    displacement: vec![0.0; 3 * n_rows],
+                });
+            }
+        };
         let kind = match (accuracy.adaptive, &prepared.bubbles) {
             (
                 Adaptive::On {
@@ -60,15 +73,15 @@ impl Shape {
             ) => {
                 n_columns = n_columns.max(bubbles.bubbles.len());
                 Kind::Constrained {
-                    coarse: upload(n_candidates, &bubbles.coarse)?,
-                    coupling: upload(bubbles.bubbles.len(), &bubbles.coupling)?,
+                    coarse: upload(n_candidates, &[&bubbles.coarse])?,
+                    coupling: upload(bubbles.bubbles.len(), &[&bubbles.coupling])?,
                     of_bubbles: vec![0.0; 3 * n_rows],
                 }
             }
             (Adaptive::On { free, .. }, _) => {
-                Kind::Select(Box::new(Select::new(prepared, free, scalar)?))
+                Kind::Select(Box::new(Select::new(prepared, whole, free, scalar)?))
             }
-            (Adaptive::Off, _) => Kind::Full(upload(n_candidates, &prepared.compliance.blocks)?),
+            (Adaptive::Off, _) => Kind::Full(upload(n_candidates, &whole.stretches())?),
         };
         Ok(Self {
             kind,
@@ -82,7 +95,7 @@ impl Shape {
     pub fn n_free(&self) -> Option<usize> {
         match &self.kind {
             Kind::Select(select) => Some(select.n_free()),
-            Kind::Full(_) | Kind::Constrained { .. } => None,
+            Kind::Full(_) | Kind::Fetched(_) | Kind::Constrained { .. } => None,
         }
     }
 
@@ -95,11 +108,14 @@ impl Shape {
         let contacts = engine.active_contacts();
         self.columns.clear();
         self.forces.clear();
-        for c in contacts {
-            self.columns.push(c.candidate);
-            self.forces.extend(c.force_on_part.to_array());
+        if !matches!(self.kind, Kind::Fetched(_)) {
+            for c in contacts {
+                self.columns.push(c.candidate);
+                self.forces.extend(c.force_on_part.to_array());
+            }
         }
         match &mut self.kind {
+            Kind::Fetched(demand) => demand.draw_into(contacts, &mut self.displacement),
             Kind::Full(multiply) => {
                 multiply.multiply_into(&self.columns, &self.forces, &mut self.displacement)?;
             }

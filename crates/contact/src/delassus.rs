@@ -8,7 +8,7 @@ use crate::plane::Plane;
 /// Compliance of the part as 3 x 3 blocks; the caller owns the storage.
 pub trait ComplianceBlocks {
     /// Displacement of candidate `row` per unit force at candidate `col`, m/N, part's frame.
-    fn block(&self, row: usize, col: usize) -> &DMat3;
+    fn block(&self, row: usize, col: usize) -> DMat3;
 }
 
 /// Compliance of the virtual coupling that holds the tool.
@@ -50,7 +50,7 @@ pub fn delassus_into(
         let twist = coupling.map(|coupling| twist_per_force(&coupling, plane_j));
         for (i, plane_i) in planes[..=j].iter().enumerate() {
             let block = compliance.block(plane_i.candidate as usize, plane_j.candidate as usize);
-            let mut displacement = *block * plane_j.normal;
+            let mut displacement = block * plane_j.normal;
             if let (Some(coupling), Some((translation, rotation))) = (&coupling, twist) {
                 // (r × n) · θ = n · (θ × r): the point of the tool at i moves away.
                 displacement += translation + rotation.cross(plane_i.point - coupling.reference);
@@ -81,8 +81,8 @@ mod tests {
 
     struct Blocks(Vec<Vec<DMat3>>);
     impl ComplianceBlocks for Blocks {
-        fn block(&self, row: usize, col: usize) -> &DMat3 {
-            &self.0[row][col]
+        fn block(&self, row: usize, col: usize) -> DMat3 {
+            self.0[row][col]
         }
     }
 

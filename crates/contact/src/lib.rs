@@ -18,8 +18,8 @@
 //! struct Springs;
 //! const SPRING: DMat3 = DMat3::from_diagonal(DVec3::splat(1e-3));
 //! impl ComplianceBlocks for Springs {
-//!     fn block(&self, row: usize, col: usize) -> &DMat3 {
-//!         if row == col { &SPRING } else { &DMat3::ZERO }
+//!     fn block(&self, row: usize, col: usize) -> DMat3 {
+//!         if row == col { SPRING } else { DMat3::ZERO }
 //!     }
 //! }
 //!

@@ -131,8 +131,8 @@ fn friction_allocates_nothing() {
 
 struct Blocks(DMat3);
 impl ComplianceBlocks for Blocks {
-    fn block(&self, _row: usize, _col: usize) -> &DMat3 {
-        &self.0
+    fn block(&self, _row: usize, _col: usize) -> DMat3 {
+        self.0
     }
 }
 

@@ -71,21 +71,28 @@ pub struct Cpu<T> {
 }
 
 impl<T: Stored> Cpu<T> {
-    /// Copies a compliance given as blocks (see [`Layout`]), m/N.
+    /// Copies a compliance given as blocks in stretches of rows (see [`Layout`]), m/N.
     ///
     /// # Errors
-    /// Where the length is wrong or a number is not finite.
-    pub fn new(layout: Layout, blocks: &[f64]) -> Result<Self, Error> {
-        check_length("blocks", blocks.len(), layout.n_scalars())?;
-        if let Some(at) = blocks.iter().position(|x| !x.is_finite()) {
-            let block = at / 9;
-            return Err(Error::NotFinite {
-                row: block % layout.n_rows(),
-                candidate: block / layout.n_rows(),
-            });
+    /// Where a length is wrong or a number is not finite.
+    pub fn new(layout: Layout, blocks: &[&[f64]]) -> Result<Self, Error> {
+        let found = blocks.iter().map(|stretch| stretch.len()).sum();
+        check_length("blocks", found, layout.n_scalars())?;
+        let mut first_row = 0;
+        for stretch in blocks {
+            let n_rows = layout.rows_of(stretch)?;
+            if let Some(at) = stretch.iter().position(|x| !x.is_finite()) {
+                let block = at / 9;
+                return Err(Error::NotFinite {
+                    row: first_row + block % n_rows,
+                    candidate: block / n_rows,
+                });
+            }
+            first_row += n_rows;
         }
         let unit = if T::IS_SCALED {
-            power_of_two_below(blocks.iter().fold(0.0, |m: f64, x| m.max(x.abs())))
+            let numbers = blocks.iter().copied().flatten();
+            power_of_two_below(numbers.fold(0.0, |m: f64, x| m.max(x.abs())))
         } else {
             1.0
         };
@@ -205,7 +212,11 @@ impl<T: Stored> Cpu<T> {
 ///
 /// # Errors
 /// Where the length is wrong or a number is not finite.
-pub fn on_cpu(layout: Layout, blocks: &[f64], scalar: Scalar) -> Result<Box<dyn Multiply>, Error> {
+pub fn on_cpu(
+    layout: Layout,
+    blocks: &[&[f64]],
+    scalar: Scalar,
+) -> Result<Box<dyn Multiply>, Error> {
     Ok(match scalar {
         Scalar::F32 => Box::new(Cpu::<f32>::new(layout, blocks)?),
         Scalar::F64 => Box::new(Cpu::<f64>::new(layout, blocks)?),
@@ -254,7 +265,7 @@ mod tests {
         let blocks = numbers.take(layout.n_scalars());
         let forces = numbers.take(9);
         for scalar in [Scalar::F32, Scalar::F64] {
-            let mut multiply = on_cpu(layout, &blocks, scalar).unwrap();
+            let mut multiply = on_cpu(layout, &[&blocks], scalar).unwrap();
             let (mut whole, mut some) = ([0.0; 21], [7.0; 21]);
             multiply
                 .multiply_into(&[3, 0, 2], &forces, &mut whole)
@@ -331,7 +342,7 @@ mod tests {
                     (Scalar::F64, 10.0 * 2_f64.powi(-53)),
                     (Scalar::F32, 2_f64.powi(-24) + 10.0 * 2_f64.powi(-53)),
                 ] {
-                    let mut multiply = on_cpu(layout, &blocks, scalar).unwrap();
+                    let mut multiply = on_cpu(layout, &[&blocks], scalar).unwrap();
                     let mut u = vec![f64::NAN; 3 * n_rows];
                     multiply.multiply_into(&columns, &forces, &mut u).unwrap();
                     for ((u, expected), scale) in u.iter().zip(&expected).zip(&scale) {
@@ -353,7 +364,7 @@ mod tests {
             let product = |factor: f64| {
                 let scaled: Vec<f64> = blocks.iter().map(|c| c * factor).collect();
                 let mut u = vec![0.0; 15];
-                on_cpu(layout, &scaled, scalar)
+                on_cpu(layout, &[&scaled], scalar)
                     .unwrap()
                     .multiply_into(&[1, 0], &forces, &mut u)
                     .unwrap();
@@ -371,7 +382,7 @@ mod tests {
         let mut numbers = Numbers(3);
         let blocks = numbers.take(layout.n_scalars());
         let forces = numbers.take(9);
-        let mut multiply = Cpu::<f32>::new(layout, &blocks).unwrap();
+        let mut multiply = Cpu::<f32>::new(layout, &[&blocks]).unwrap();
         let (mut a, mut b) = (vec![1e30; 300], vec![f64::NAN; 300]);
         multiply.multiply_into(&[2, 0, 1], &forces, &mut a).unwrap();
         multiply.multiply_into(&[2, 0, 1], &forces, &mut b).unwrap();
@@ -384,8 +395,8 @@ mod tests {
     fn bytes_and_names_tell_the_two_apart() {
         let layout = Layout::new(10, 2).unwrap();
         let blocks = vec![0.0; 180];
-        let narrow = on_cpu(layout, &blocks, Scalar::F32).unwrap();
-        let wide = on_cpu(layout, &blocks, Scalar::F64).unwrap();
+        let narrow = on_cpu(layout, &[&blocks], Scalar::F32).unwrap();
+        let wide = on_cpu(layout, &[&blocks], Scalar::F64).unwrap();
         assert_eq!((narrow.bytes(), wide.bytes()), (720, 1440));
         assert_eq!(narrow.name(), "cpu, 32-bit compliance");
         assert_eq!(wide.name(), "cpu, 64-bit compliance");
@@ -395,7 +406,7 @@ mod tests {
     #[test]
     fn wrong_lengths_and_columns_are_typed_errors_and_write_nothing() {
         let layout = Layout::new(2, 2).unwrap();
-        let mut multiply = Cpu::<f64>::new(layout, &[1.0; 36]).unwrap();
+        let mut multiply = Cpu::<f64>::new(layout, &[&[1.0; 36]]).unwrap();
         let mut u = [7.0; 6];
         assert_eq!(
             multiply.multiply_into(&[0], &[1.0; 4], &mut u),
@@ -419,7 +430,7 @@ mod tests {
         assert_eq!(error.to_string(), "column 2 is not among the 2 candidates");
         assert_eq!(u, [7.0; 6]);
         assert!(matches!(
-            Cpu::<f64>::new(layout, &[1.0; 35]),
+            Cpu::<f64>::new(layout, &[&[1.0; 35]]),
             Err(Error::WrongLength { what: "blocks", .. })
         ));
     }
@@ -431,7 +442,7 @@ mod tests {
         blocks[(3 + 2) * 9 + 4] = f64::NAN;
         for scalar in [Scalar::F32, Scalar::F64] {
             assert_eq!(
-                on_cpu(layout, &blocks, scalar).err(),
+                on_cpu(layout, &[&blocks], scalar).err(),
                 Some(Error::NotFinite {
                     row: 2,
                     candidate: 1

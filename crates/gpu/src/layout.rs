@@ -6,8 +6,9 @@ use crate::error::Error;
 
 /// Sizes of a compliance and its two layouts.
 ///
-/// *Blocks*, as it is handed over: for each candidate the 3 x 3 blocks of all rows, each block
-/// column-major (displacement of the row per unit force along x, then y, then z):
+/// *Blocks*, as it is handed over: in one or more stretches of rows that follow each other, each with, for each
+/// candidate, the 3 x 3 blocks of the stretch's rows, each block column-major (displacement of the row per unit
+/// force along x, then y, then z):
 ///
 /// ```text
 /// candidate 0                                        candidate 1
@@ -86,31 +87,48 @@ impl Layout {
         start..start + self.displacement_len()
     }
 
-    /// Writes columns from blocks, each number through `convert`.
+    /// Writes columns from blocks, each number through `convert`. `blocks`: stretches of rows.
     ///
     /// # Errors
     /// Where a slice has the wrong length.
     pub fn columns_from_blocks<T: Copy>(
         &self,
-        blocks: &[f64],
+        blocks: &[&[f64]],
         columns: &mut [T],
         convert: impl Fn(f64) -> T,
     ) -> Result<(), Error> {
-        for (what, found) in [("blocks", blocks.len()), ("columns", columns.len())] {
+        let found = blocks.iter().map(|stretch| stretch.len()).sum();
+        for (what, found) in [("blocks", found), ("columns", columns.len())] {
             check_length(what, found, self.n_scalars())?;
         }
-        for candidate in 0..self.n_candidates {
-            for axis in 0..3 {
-                let column = &mut columns[self.column(candidate, axis)];
-                for (row, displacement) in column.chunks_exact_mut(3).enumerate() {
-                    let block = Self::block_offset(self.n_rows, row, candidate) + 3 * axis;
-                    for (to, from) in displacement.iter_mut().zip(&blocks[block..block + 3]) {
-                        *to = convert(*from);
+        let mut first_row = 0;
+        for stretch in blocks {
+            let n_rows = self.rows_of(stretch)?;
+            let rows = 3 * first_row..3 * (first_row + n_rows);
+            for candidate in 0..self.n_candidates {
+                for axis in 0..3 {
+                    let column = &mut columns[self.column(candidate, axis)][rows.clone()];
+                    for (row, displacement) in column.chunks_exact_mut(3).enumerate() {
+                        let block = Self::block_offset(n_rows, row, candidate) + 3 * axis;
+                        for (to, from) in displacement.iter_mut().zip(&stretch[block..block + 3]) {
+                            *to = convert(*from);
+                        }
                     }
                 }
             }
+            first_row += n_rows;
         }
         Ok(())
+    }
+
+    /// Rows of a stretch of blocks.
+    ///
+    /// # Errors
+    /// Where it does not hold whole rows.
+    pub(crate) fn rows_of(&self, stretch: &[f64]) -> Result<usize, Error> {
+        let n_rows = stretch.len() / (9 * self.n_candidates).max(1);
+        let whole = 9 * self.n_candidates * n_rows;
+        check_length("blocks", stretch.len(), whole).map(|()| n_rows)
     }
 }
 
@@ -137,7 +155,7 @@ mod tests {
         let blocks: Vec<f64> = (0_u32..108).map(f64::from).collect();
         let mut columns = vec![f64::NAN; layout.n_scalars()];
         layout
-            .columns_from_blocks(&blocks, &mut columns, |x| x)
+            .columns_from_blocks(&[&blocks], &mut columns, |x| x)
             .unwrap();
         for candidate in 0..3 {
             for row in 0..4 {
@@ -149,6 +167,34 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    #[test]
+    fn stretches_of_rows_give_the_columns_of_the_whole() {
+        let layout = Layout::new(4, 3).unwrap();
+        let blocks: Vec<f64> = (0_u32..108).map(f64::from).collect();
+        let rows = |range: Range<usize>| -> Vec<f64> {
+            blocks
+                .chunks_exact(36)
+                .flat_map(|column| column[9 * range.start..9 * range.end].to_vec())
+                .collect()
+        };
+        let columns_of = |blocks: &[&[f64]]| {
+            let mut columns = vec![f64::NAN; layout.n_scalars()];
+            let written = layout.columns_from_blocks(blocks, &mut columns, |x| x);
+            written.map(|()| columns)
+        };
+        let whole = columns_of(&[&blocks]).unwrap();
+        let (first, second) = (rows(0..3), rows(3..4));
+        assert_eq!(columns_of(&[&first, &second]).unwrap(), whole);
+        assert_eq!(columns_of(&[&[], &blocks]).unwrap(), whole);
+        for wrong in [
+            &[&first[..]][..],
+            &[&first, &first],
+            &[&first[1..], &second],
+        ] {
+            assert!(matches!(columns_of(wrong), Err(Error::WrongLength { .. })));
         }
     }
 
@@ -170,7 +216,7 @@ mod tests {
         let layout = Layout::new(2, 2).unwrap();
         let mut columns = vec![0.0; 36];
         assert_eq!(
-            layout.columns_from_blocks(&[0.0; 35], &mut columns, |x| x),
+            layout.columns_from_blocks(&[&[0.0; 35]], &mut columns, |x| x),
             Err(Error::WrongLength {
                 what: "blocks",
                 found: 35,
@@ -179,7 +225,7 @@ mod tests {
         );
         assert!(
             layout
-                .columns_from_blocks(&[0.0; 36], &mut columns[1..], |x| x)
+                .columns_from_blocks(&[&[0.0; 36]], &mut columns[1..], |x| x)
                 .is_err()
         );
     }

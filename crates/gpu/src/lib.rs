@@ -25,7 +25,7 @@
 //!         blocks[Layout::block_offset(2, row, 0) + 4 * axis] = compliance;
 //!     }
 //! }
-//! let mut multiply = on_cpu(layout, &blocks, Scalar::F64)?;
+//! let mut multiply = on_cpu(layout, &[&blocks], Scalar::F64)?;
 //!
 //! let mut displacement = [0.0; 6];
 //! multiply.multiply_into(&[0], &[0.0, 0.0, -10.0], &mut displacement)?;

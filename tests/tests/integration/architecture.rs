@@ -65,7 +65,7 @@ fn nothing_the_step_calls_can_lock() {
             let path = entry.unwrap().path();
             if path.is_dir() {
                 folders.push(path);
-            } else if !path.ends_with("tool/field/build.rs") {
+            } else if !path.ends_with("tool/field/build.rs") && !path.ends_with("tests.rs") {
                 // A distance field is built in parallel, before the first step.
                 files.push(path);
             }
@@ -73,9 +73,10 @@ fn nothing_the_step_calls_can_lock() {
     }
     for path in files {
         let text = std::fs::read_to_string(&path).unwrap();
+        let (code, _) = text.split_once("#[cfg(test)]").unwrap_or((&text, ""));
         n_files += 1;
         for waits in WAITS {
-            assert!(!text.contains(waits), "{}: {waits}", path.display());
+            assert!(!code.contains(waits), "{}: {waits}", path.display());
         }
     }
     assert!(n_files > 20, "{n_files} files only");

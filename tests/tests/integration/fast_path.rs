@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use contact::delassus::ComplianceBlocks;
 use contact::lcp;
 use contact::tool::{Mesh, Tool};
 use device::VirtualCoupling;
@@ -27,8 +28,7 @@ struct BruteForce<'a> {
 
 impl BruteForce<'_> {
     fn block(&self, i: usize, j: usize) -> DMat3 {
-        let n_rows = self.part.blocks().len() / 9 / self.part.n_candidates();
-        DMat3::from_cols_slice(&self.part.blocks()[9 * (j * n_rows + i)..][..9])
+        ComplianceBlocks::block(self.part, i, j)
     }
 
     fn positions(&self) -> Vec<DVec3> {
@@ -129,7 +129,7 @@ fn compare(name: &str, as_mesh: bool, deepest: f64) {
     let near_distance = settings.near_distance;
     let largest_motion = 0.2 * settings.max_stride;
     let coupling = *usual.coupling().unwrap();
-    let part = Arc::new(prepared.contact_part());
+    let part = prepared.contact_part();
     let mut fast = Engine::new(Arc::clone(&part), tool.clone(), Some(coupling), settings).unwrap();
     let mut slow = BruteForce {
         part: &part,

@@ -4,8 +4,6 @@
 //! constrained part with all nodes free is the full one; switching free nodes while the tool slides
 //! changes the wrench by no more than the stated bound.
 
-use std::sync::Arc;
-
 use glamx::DPose3;
 use snapin::engine::{Engine, FreeSettings, StepReport, switch_bound};
 use snapin::prepare::{PrepareOptions, PreparedPart, prepare};
@@ -120,12 +118,13 @@ fn a_constrained_part_with_all_nodes_free_is_the_full_part() {
     // Planes of both converged far beyond what a scene asks for, so that only the operators differ.
     let mut engine_settings = plain.settings().clone();
     engine_settings.displacement_tolerance = 1e-14;
-    let part = Arc::new(whole.prepared.contact_part());
+    let part = whole.prepared.contact_part();
     let (tool, _) = setup::tool(&whole.scene).unwrap();
     let mut engine = Engine::new(part, tool, coupling, engine_settings.clone()).unwrap();
-    let (coarse, data) = free
-        .prepared
-        .constrained_part(free.prepared.bubbles.as_ref().unwrap());
+    let (coarse, data) = free.prepared.constrained_part(
+        free.prepared.bubbles.as_ref().unwrap(),
+        free.prepared.compliance.all().unwrap(),
+    );
     let mut settings = FreeSettings::within(1.0);
     settings.max_free = data.positions.len();
     let (tool, _) = setup::tool(&free.scene).unwrap();

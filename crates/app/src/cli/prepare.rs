@@ -57,7 +57,7 @@ fn table(prepared: &PreparedPart) -> String {
         loaded.mesh.order as usize,
         loaded.rows.len(),
         loaded.candidates.len(),
-        bytes(8.0 * prepared.compliance.blocks.len() as f64),
+        bytes(prepared.compliance.bytes()),
     );
     for (stage, seconds) in &prepared.seconds {
         text += &format!("  {stage:<22}{}\n", duration(*seconds));
@@ -93,7 +93,7 @@ fn to_json(prepared: &PreparedPart) -> String {
         "order": loaded.mesh.order as usize,
         "surface_nodes": loaded.rows.len(),
         "candidates": loaded.candidates.len(),
-        "compliance_bytes": 8 * prepared.compliance.blocks.len(),
+        "compliance_bytes": prepared.compliance.bytes(),
         "from_cache": prepared.from_cache,
         "cache_file": prepared.cache_file,
         "seconds": seconds,

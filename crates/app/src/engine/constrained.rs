@@ -237,7 +237,7 @@ impl Constrained {
         }
         let (now, next) = (&self.now, &self.next);
         self.blended.refill(|i, j| {
-            *part.block(i as usize, j as usize)
+            part.block(i as usize, j as usize)
                 + (1.0 - blend) * now.block(i, j)
                 + blend * next.block(i, j)
         });
@@ -412,7 +412,7 @@ impl Constrained {
                 } else {
                     DMat3::ZERO
                 };
-                *part.block(i as usize, j as usize) + (1.0 - blend) * now.block(i, j) + of_next
+                part.block(i as usize, j as usize) + (1.0 - blend) * now.block(i, j) + of_next
             });
         }
         has_room

@@ -109,7 +109,7 @@ impl Pairs {
             };
             self.asked_at[slot] = self.now;
             self.put(slot, candidate, |_, i| {
-                *part.block(i as usize, candidate as usize)
+                part.block(i as usize, candidate as usize)
             });
         }
         true
@@ -150,7 +150,7 @@ impl Pairs {
 
 impl ComplianceBlocks for Pairs {
     #[inline]
-    fn block(&self, row: usize, col: usize) -> &DMat3 {
-        self.at(self.slot_of[row] as usize, self.slot_of[col] as usize)
+    fn block(&self, row: usize, col: usize) -> DMat3 {
+        *self.at(self.slot_of[row] as usize, self.slot_of[col] as usize)
     }
 }

@@ -75,6 +75,8 @@ pub struct StepReport {
     pub contacts: u32,
     /// Near nodes left out because memory for more was not reserved.
     pub dropped: u32,
+    /// Near nodes left out because their column of the compliance is not there yet.
+    pub without_column: u32,
     /// Passes over the contact planes (of the last stride).
     pub passes: u32,
     /// Strides in which a fast handle was followed.
@@ -109,6 +111,7 @@ impl StepReport {
             near: 0,
             contacts: 0,
             dropped: 0,
+            without_column: 0,
             passes: 0,
             strides: 0,
             pivots: 0,

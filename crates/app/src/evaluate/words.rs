@@ -2,6 +2,7 @@
 
 use super::Story;
 use crate::engine::MOST_FREE;
+use crate::prepare::PreparedCompliance;
 use crate::prepare::budget::bytes;
 use crate::scene::ToolShape;
 use crate::session::Record;
@@ -17,6 +18,11 @@ impl Story<'_> {
             (
                 count(&|r| !r.report.converged) as u64,
                 "steps whose contact planes did not come to a stand",
+            ),
+            (
+                count(&|r| r.report.without_column > 0) as u64,
+                "steps in which a node near the tool could not be touched, because its column was not fetched yet or \
+                 there is no memory for more",
             ),
             (
                 count(&|r| !r.report.lcp_solved) as u64,
@@ -153,11 +159,24 @@ impl Story<'_> {
                 "elements",
                 format!("order {}", self.prepared.loaded.mesh.order),
             ),
-            pair(
-                "compliance",
-                bytes(8.0 * self.prepared.compliance.blocks.len() as f64),
-            ),
+            pair("compliance", self.compliance_words()),
         ]
+    }
+
+    fn compliance_words(&self) -> String {
+        let kept = bytes(self.prepared.compliance.bytes());
+        let scalar = match self.prepared.loaded.spec.contact_scalar {
+            gpu::Scalar::F64 => "64",
+            gpu::Scalar::F32 => "32",
+        };
+        match &self.prepared.compliance {
+            PreparedCompliance::All(_) => format!("{kept}, the step reads {scalar} bits"),
+            PreparedCompliance::Near(demand) => format!(
+                "{kept} with the factor, {scalar} bits, {} of {} columns fetched",
+                demand.part().n_columns(),
+                demand.part().n_candidates()
+            ),
+        }
     }
 
     pub(super) fn checks(&self) -> Vec<(String, String)> {

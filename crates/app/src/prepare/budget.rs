@@ -1,14 +1,24 @@
 //! What preparing a part will take, told before it is begun.
 
+use gpu::Scalar;
+
 use crate::Error;
 use crate::machine::Machine;
 
-use super::LoadedPart;
+use super::demand::column_bytes;
+use super::{ColumnChoice, LoadedPart};
+
+/// Columns without which a part that fetches them is no use: what a tool may touch at a time.
+const FEWEST_COLUMNS: usize = 256;
+
+/// Of the memory that the factor leaves, what columns that are fetched may take.
+const SHARE_OF_COLUMNS: f64 = 0.6;
 
 /// Expected memory and time of preparing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Forecast {
-    /// Bytes of the stored compliance: 72 per pair of candidate and surface node.
+    /// Bytes of the whole compliance: 72 per pair of candidate and surface node for what is kept, as much for what is
+    /// drawn from, and where the step reads 32 bits 36 per pair of candidates.
     pub compliance_bytes: f64,
     /// Bytes of stiffness and factor.
     pub factor_bytes: f64,
@@ -27,7 +37,12 @@ impl Forecast {
         let columns = 3.0 * loaded.candidates.len() as f64;
         let factor_entries = 5.0 * n.powf(1.35);
         Self {
-            compliance_bytes: 72.0 * loaded.candidates.len() as f64 * loaded.rows.len() as f64,
+            compliance_bytes: loaded.candidates.len() as f64
+                * (144.0 * loaded.rows.len() as f64
+                    + match loaded.spec.contact_scalar {
+                        Scalar::F64 => 0.0,
+                        Scalar::F32 => 36.0 * loaded.candidates.len() as f64,
+                    }),
             factor_bytes: 8.0 * factor_entries + 12.0 * 90.0 * n,
             seconds: 4e-9 * n.powf(1.9) + 2.0 * columns * factor_entries * 1.2e-10 + 4e-6 * n,
         }
@@ -43,9 +58,67 @@ impl Forecast {
             loaded.mesh.n_elements(),
             loaded.candidates.len(),
             loaded.rows.len(),
-            bytes(self.compliance_bytes + self.factor_bytes),
+            bytes(self.needed()),
             duration(self.seconds),
         )
+    }
+
+    /// Whether columns are fetched when the tool comes near, as the part asks or because all do not fit.
+    pub(super) fn fetches_columns(&self, loaded: &LoadedPart) -> bool {
+        let fits = || self.needed() <= Machine::read().available_memory as f64;
+        match loaded.spec.columns {
+            ColumnChoice::All => false,
+            ColumnChoice::Near => true,
+            // What constrains or interpolates nodes needs all.
+            ColumnChoice::Auto => loaded.spec.bubbles.is_none() && !fits(),
+        }
+    }
+
+    /// How many columns may be fetched.
+    ///
+    /// # Errors
+    /// If there is not even memory for the factor and some columns, with what to change.
+    pub(super) fn columns_that_fit(&self, loaded: &LoadedPart) -> Result<usize, Error> {
+        self.columns_within(loaded, Machine::read().available_memory as f64)
+    }
+
+    fn columns_within(&self, loaded: &LoadedPart, available: f64) -> Result<usize, Error> {
+        let of_column = column_bytes(loaded.rows.len(), loaded.spec.contact_scalar);
+        let for_columns = SHARE_OF_COLUMNS * (available - self.factor_bytes).max(0.0);
+        let capacity = ((for_columns / of_column) as usize).min(loaded.candidates.len());
+        if capacity >= FEWEST_COLUMNS.min(loaded.candidates.len()) {
+            return Ok(capacity);
+        }
+        Err(Error::Input(format!(
+            "{}: fetching columns needs about {} ({} factor, {FEWEST_COLUMNS} columns of {}) and {} are free; coarsen \
+             the mesh or use elements of lower order",
+            loaded.spec.mesh_path.display(),
+            bytes(self.factor_bytes + FEWEST_COLUMNS as f64 * of_column / SHARE_OF_COLUMNS),
+            bytes(self.factor_bytes),
+            bytes(of_column),
+            bytes(available),
+        )))
+    }
+
+    /// The forecast of a part that fetches columns, in one line.
+    pub(super) fn fetched_line(&self, loaded: &LoadedPart, capacity: usize) -> String {
+        let of_column = column_bytes(loaded.rows.len(), loaded.spec.contact_scalar);
+        format!(
+            "preparing {}: {} nodes, {} elements, {} nodes can touch, {} on the surface; the whole compliance would be \
+             {}; the factor takes about {}, columns are fetched when the tool comes near, {capacity} at most, {} each",
+            loaded.spec.mesh_path.display(),
+            loaded.mesh.n_nodes(),
+            loaded.mesh.n_elements(),
+            loaded.candidates.len(),
+            loaded.rows.len(),
+            bytes(self.compliance_bytes),
+            bytes(self.factor_bytes),
+            bytes(of_column),
+        )
+    }
+
+    fn needed(&self) -> f64 {
+        self.compliance_bytes + self.factor_bytes
     }
 
     /// # Errors
@@ -55,13 +128,14 @@ impl Forecast {
     }
 
     fn refuse_beyond(&self, loaded: &LoadedPart, available: f64) -> Result<(), Error> {
-        let needed = self.compliance_bytes + self.factor_bytes;
+        let needed = self.needed();
         if needed <= available {
             return Ok(());
         }
         let mend = if self.compliance_bytes > self.factor_bytes {
             format!(
-                "name a smaller region in part.contact ({} nodes can touch now) or coarsen the mesh",
+                "leave accuracy.columns = \"all\" and the p-method out, name a smaller region in part.contact ({} nodes \
+                 can touch now) or coarsen the mesh",
                 loaded.candidates.len()
             )
         } else {
@@ -121,6 +195,8 @@ mod tests {
             order: Some(2),
             refinements: 0,
             bubbles: None,
+            columns: ColumnChoice::All,
+            contact_scalar: Scalar::F64,
             material: Material::new(2.7e9, 0.35).unwrap(),
             fixed: vec![(group("fixed"), [true; 3])],
             contact: vec![group("contact")],
@@ -134,8 +210,8 @@ mod tests {
         let part = clip();
         let forecast = Forecast::of(&part);
         let pairs = (part.candidates.len() * part.rows.len()) as f64;
-        assert_eq!(forecast.compliance_bytes, 72.0 * pairs);
-        let needed = forecast.compliance_bytes + forecast.factor_bytes;
+        assert_eq!(forecast.compliance_bytes, 144.0 * pairs);
+        let needed = forecast.needed();
         assert!(forecast.refuse_beyond(&part, needed).is_ok());
         let refusal = forecast
             .refuse_beyond(&part, 0.5 * needed)

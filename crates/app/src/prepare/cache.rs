@@ -2,7 +2,9 @@
 //! carries a checksum of every byte. A damaged, cut or foreign file is never used.
 //!
 //! Layout, little-endian: magic (8 bytes), format (u32), scalar bytes (u32), key (32 bytes),
-//! candidates and rows (u64 each), checks (3 x f64), 3x3 blocks (f64), BLAKE3 of all before (32).
+//! candidates and rows (u64 each), checks (3 x f64), 3x3 blocks (f64) of the candidates' rows, which the step reads,
+//! then of the rows that are only drawn, BLAKE3 of all before (32). Numbers lie at multiples of 8: the file is mapped,
+//! not copied.
 
 use std::fs;
 use std::io::{self, Write};
@@ -10,8 +12,10 @@ use std::path::{Path, PathBuf};
 
 use fem::{Compliance, ComplianceChecks};
 
+use crate::stored::{Mapped, Source, StoredCompliance, sections};
+
 /// Changes whenever the meaning of the file or the numbers in it changes.
-pub const FORMAT: u32 = 2;
+pub const FORMAT: u32 = 3;
 
 const MAGIC: &[u8; 8] = b"SNAPINC\n";
 const HEADER: usize = 8 + 4 + 4 + 32 + 8 + 8 + 24;
@@ -56,33 +60,41 @@ pub fn file_of(dir: &Path, mesh_path: &Path, key: &[u8; 32]) -> PathBuf {
     dir.join(format!("{stem}-{hex}.cache"))
 }
 
-/// Reads a cached part. `Ok(None)`: there is none.
+/// Maps a cached part and checks every byte of it. `Ok(None)`: there is none.
 ///
 /// # Errors
 /// What is wrong with the file; the caller prepares anew.
 pub fn read(
     file: &Path,
     key: &[u8; 32],
-    candidates: &[u32],
-    rows: &[u32],
-) -> Result<Option<(Compliance, ComplianceChecks)>, Damage> {
-    let bytes = match fs::read(file) {
-        Ok(bytes) => bytes,
+    n_candidates: usize,
+    n_rows: usize,
+) -> Result<Option<(StoredCompliance, ComplianceChecks)>, Damage> {
+    let unreadable = |e: io::Error| Damage::Unreadable(e.to_string());
+    let opened = match fs::File::open(file) {
+        Ok(opened) => opened,
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
-        Err(e) => return Err(Damage::Unreadable(e.to_string())),
+        Err(e) => return Err(unreadable(e)),
     };
-    let n_blocks = candidates.len() * rows.len();
-    if bytes.len() < HEADER + CHECKSUM {
+    if opened.metadata().map_err(unreadable)?.len() < (HEADER + CHECKSUM) as u64 {
         return Err(Damage::Length);
     }
-    let (body, checksum) = bytes.split_at(bytes.len() - CHECKSUM);
-    if blake3::hash(body).as_bytes() != checksum {
+    let map = Mapped::open(&opened).map_err(unreadable)?;
+    let (body, checksum) = map.split_at(map.len() - CHECKSUM);
+    // All bytes are in memory afterwards: no step waits for the disk.
+    if blake3::Hasher::new()
+        .update_rayon(body)
+        .finalize()
+        .as_bytes()
+        != checksum
+    {
         return Err(Damage::Checksum);
     }
-    if body[..HEADER - 24] != header(key, candidates.len(), rows.len())[..] {
+    if body[..HEADER - 24] != header(key, n_candidates, n_rows)[..] {
         return Err(Damage::Kind);
     }
-    if body.len() != HEADER + 72 * n_blocks {
+    let drawn_from = HEADER + 72 * n_candidates * n_candidates;
+    if body.len() != HEADER + 72 * n_candidates * n_rows {
         return Err(Damage::Length);
     }
     let number = |at: usize| {
@@ -95,13 +107,18 @@ pub fn read(
         residual_rel: number(HEADER - 16),
         smallest_pivot_rel: number(HEADER - 8),
     };
-    let blocks = bytemuck::pod_collect_to_vec::<u8, f64>(&body[HEADER..]);
-    let compliance = Compliance {
-        candidates: candidates.to_vec(),
-        rows: rows.to_vec(),
-        blocks,
+    let section = |bytes| {
+        Mapped::new(&map, bytes)
+            .map(Source::Mapped)
+            .ok_or_else(|| Damage::Unreadable("this machine cannot map it".to_owned()))
     };
-    Ok(Some((compliance, checks)))
+    let stored = StoredCompliance::of_sections(
+        n_candidates,
+        n_rows,
+        section(HEADER..drawn_from)?,
+        section(drawn_from..body.len())?,
+    );
+    Ok(Some((stored, checks)))
 }
 
 /// Writes a part beside its place and renames it.
@@ -141,14 +158,15 @@ fn write_to(
         head.extend(number.to_le_bytes());
     }
     let mut hash = blake3::Hasher::new();
-    let mut out = fs::File::create(partial)?;
-    let blocks: &[u8] = bytemuck::cast_slice(&compliance.blocks);
-    for bytes in [head.as_slice(), blocks] {
+    let mut out = io::BufWriter::with_capacity(1 << 20, fs::File::create(partial)?);
+    let (contact, drawn) = sections(compliance);
+    let columns = contact.into_iter().chain(drawn).map(bytemuck::cast_slice);
+    for bytes in std::iter::once(head.as_slice()).chain(columns) {
         hash.update(bytes);
         out.write_all(bytes)?;
     }
     out.write_all(hash.finalize().as_bytes())?;
-    out.sync_all()
+    out.into_inner()?.sync_all()
 }
 
 fn header(key: &[u8; 32], n_candidates: usize, n_rows: usize) -> Vec<u8> {
@@ -186,10 +204,14 @@ mod tests {
         let (compliance, checks) = sample();
         let key = [7; 32];
         let file = file_of(dir.path(), Path::new("clip.msh"), &key);
-        assert!(read(&file, &key, &[3, 7], &[3, 7, 9]).unwrap().is_none());
+        assert!(read(&file, &key, 2, 3).unwrap().is_none());
         write(&file, &key, &compliance, &checks).unwrap();
-        let (again, checks_again) = read(&file, &key, &[3, 7], &[3, 7, 9]).unwrap().unwrap();
-        assert_eq!(again.blocks, compliance.blocks);
+        let (again, checks_again) = read(&file, &key, 2, 3).unwrap().unwrap();
+        for j in 0..2 {
+            for i in 0..3 {
+                assert_eq!(again.block(i, j), compliance.block(i, j));
+            }
+        }
         assert_eq!(checks_again.residual_rel, checks.residual_rel);
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
     }
@@ -206,17 +228,11 @@ mod tests {
             let mut bad = good.clone();
             bad[byte] ^= 1 << (byte % 8);
             fs::write(&file, &bad).unwrap();
-            assert!(
-                read(&file, &key, &[3, 7], &[3, 7, 9]).is_err(),
-                "byte {byte}"
-            );
+            assert!(read(&file, &key, 2, 3).is_err(), "byte {byte}");
         }
         for len in [0, 10, HEADER, good.len() - 1] {
             fs::write(&file, &good[..len]).unwrap();
-            assert!(
-                read(&file, &key, &[3, 7], &[3, 7, 9]).is_err(),
-                "length {len}"
-            );
+            assert!(read(&file, &key, 2, 3).is_err(), "length {len}");
         }
     }
 }

@@ -11,6 +11,7 @@ use crate::Error;
 use crate::free_nodes::{FreeNodes, Rule};
 use crate::prepare::PreparedPart;
 use crate::scene;
+use crate::stored::StoredCompliance;
 
 /// Updates in which a node that is freed or constrained moves from one place to the other: 80 ms at
 /// 60 Hz, too slow to be seen as a jump.
@@ -45,6 +46,7 @@ pub(super) struct Select {
 impl Select {
     pub(super) fn new(
         prepared: &PreparedPart,
+        whole: &StoredCompliance,
         free: scene::FreeNodes,
         scalar: Scalar,
     ) -> Result<Self, Error> {
@@ -91,15 +93,14 @@ impl Select {
             .map(|node| DVec3::from_array(loaded.mesh.nodes[*node as usize]))
             .collect();
 
-        let blocks = &prepared.compliance.blocks;
-        let mut permuted = Vec::with_capacity(blocks.len());
-        for column in blocks.chunks_exact((9 * n_rows).max(1)) {
+        let layout = Layout::new(n_rows, n_candidates)?;
+        let mut permuted = Vec::with_capacity(layout.n_scalars());
+        for candidate in 0..n_candidates {
             for row in &row_of {
-                permuted.extend_from_slice(&column[9 * *row as usize..][..9]);
+                permuted.extend_from_slice(whole.block(*row as usize, candidate));
             }
         }
-        let layout = Layout::new(n_rows, n_candidates)?;
-        let mut multiply = gpu::on_cpu(layout, &permuted, scalar)?;
+        let mut multiply = gpu::on_cpu(layout, &[&permuted], scalar)?;
         let n_interface = n_rows - n_principal;
         let (rule, max_free) = match free {
             scene::FreeNodes::Radius(radius) => (Rule::Radius(radius), n_interface),

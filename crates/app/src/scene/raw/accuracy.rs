@@ -7,6 +7,7 @@ use serde::de::value::MapAccessDeserializer;
 use serde::de::{self, Deserialize, Deserializer, MapAccess, Visitor};
 
 use super::{At, default};
+use crate::scene::Columns;
 
 /// How often contact planes are put on anew.
 #[derive(Debug)]
@@ -55,13 +56,13 @@ impl JsonSchema for IterationsRaw {
     }
 }
 
-/// Number type of the displacement multiply.
+/// Number type of a kept compliance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub(in crate::scene) enum ScalarRaw {
     /// 64 bits.
     F64,
-    /// 32 bits: half the memory to read, about seven digits of the drawn shape.
+    /// 32 bits: half the memory to read, about seven digits.
     F32,
 }
 
@@ -264,6 +265,15 @@ pub(in crate::scene) struct AccuracyKeys {
     /// Number type of the displacement multiply; forces are always computed in f64.
     #[schemars(extend("default" = "f64"))]
     pub(in crate::scene) scalar: Option<At<ScalarRaw>>,
+    /// Number type in which the compliance between nodes that can touch is kept for the step; sums and solutions are
+    /// in f64. `"f32"` halves the memory and changes forces in the seventh digit.
+    #[schemars(extend("default" = "f64"))]
+    pub(in crate::scene) contact_scalar: Option<At<ScalarRaw>>,
+    /// Which columns of the compliance, one for each node that can touch, are computed beforehand; a node without
+    /// its column cannot be touched yet. `"near"` is for parts whose compliance does not fit into memory: the part is
+    /// factored at each start, and a node whose column came late is eased in. Not with `adaptive`.
+    #[schemars(extend("default" = "auto"))]
+    pub(in crate::scene) columns: Option<At<Columns>>,
     /// Where the displacement multiply runs.
     #[schemars(extend("default" = "auto"))]
     pub(in crate::scene) multiply: Option<At<MultiplyRaw>>,

@@ -6,7 +6,8 @@ use super::super::raw::{
 };
 use super::super::units::Quantity;
 use super::super::{
-    Accuracy, Adaptive, ContactIterations, FreeNodes, Multiply, PMethod, Preset, Scalar, SceneError,
+    Accuracy, Adaptive, Columns, ContactIterations, FreeNodes, Multiply, PMethod, Preset, Scalar,
+    SceneError,
 };
 use super::{Check, Range};
 
@@ -59,16 +60,30 @@ impl Check<'_> {
                 None => None,
             },
             max_contacts: max_contacts as usize,
-            scalar: match raw.scalar.as_ref().map(|at| at.value) {
-                Some(ScalarRaw::F32) => Scalar::F32,
-                Some(ScalarRaw::F64) => Scalar::F64,
-                None => base.scalar,
-            },
+            scalar: scalar(raw.scalar.as_ref()).unwrap_or(base.scalar),
+            contact_scalar: scalar(raw.contact_scalar.as_ref()).unwrap_or(base.contact_scalar),
+            columns: self.columns(raw, base.adaptive)?,
             multiply: match raw.multiply.as_ref().map(|at| at.value) {
                 Some(MultiplyRaw::Cpu) => Multiply::Cpu,
                 _ => Multiply::Auto,
             },
         })
+    }
+
+    fn columns(&self, raw: &AccuracyKeys, preset: Adaptive) -> Result<Columns, SceneError> {
+        let Some(at) = &raw.columns else {
+            return Ok(Columns::default());
+        };
+        let adapts = match &raw.adaptive {
+            Some(adaptive) => !matches!(adaptive.value, AdaptiveRaw::Off),
+            None => preset != Adaptive::Off,
+        };
+        if at.value == Columns::Near && adapts {
+            let what = "columns \"near\" and adaptive do not go together".to_owned();
+            let mend = "leave columns out, or write adaptive = \"off\"";
+            return Err(self.error(at.offset, what, mend));
+        }
+        Ok(at.value)
     }
 
     /// Order of the elements: of `accuracy.order`, `part.order` or the preset.
@@ -187,4 +202,11 @@ impl Check<'_> {
     fn radius(&self, at: &At<f64>) -> Result<f64, SceneError> {
         self.number("adaptive radius", at, Quantity::Length, Range::NotNegative)
     }
+}
+
+fn scalar(raw: Option<&At<ScalarRaw>>) -> Option<Scalar> {
+    raw.map(|at| match at.value {
+        ScalarRaw::F32 => Scalar::F32,
+        ScalarRaw::F64 => Scalar::F64,
+    })
 }

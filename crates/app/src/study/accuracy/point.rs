@@ -29,6 +29,8 @@ pub enum Axis {
     MaxContacts,
     /// Number type of the drawn shape.
     Scalar,
+    /// Number type of the compliance that the step reads.
+    ContactScalar,
     /// Rule for the element integrals.
     Quadrature,
     /// Settings for a goal.
@@ -37,7 +39,7 @@ pub enum Axis {
 
 impl Axis {
     /// All, in the order of the tables.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Order,
         Self::Mesh,
         Self::Planes,
@@ -47,6 +49,7 @@ impl Axis {
         Self::LcpRounds,
         Self::MaxContacts,
         Self::Scalar,
+        Self::ContactScalar,
         Self::Quadrature,
         Self::Preset,
     ];
@@ -63,6 +66,7 @@ impl Axis {
             Self::LcpRounds => "lcp-budget",
             Self::MaxContacts => "contacts",
             Self::Scalar => "scalar",
+            Self::ContactScalar => "contact-scalar",
             Self::Quadrature => "quadrature",
             Self::Preset => "preset",
         }
@@ -80,6 +84,7 @@ impl Axis {
             Self::LcpRounds => "LCP budget",
             Self::MaxContacts => "contacts kept",
             Self::Scalar => "numbers of the drawn shape",
+            Self::ContactScalar => "numbers of the contact compliance",
             Self::Quadrature => "quadrature",
             Self::Preset => "preset",
         }
@@ -274,6 +279,13 @@ pub(super) fn points(scene: &Scene, axes: &[Axis], own_order: u8, extent: f64) -
             Axis::Scalar => {
                 for (label, scalar) in [("f32", Scalar::F32), ("f64", Scalar::F64)] {
                     add(label.to_owned(), &|s| s.scene.accuracy.scalar = scalar);
+                }
+            }
+            Axis::ContactScalar => {
+                for (label, scalar) in [("f32", Scalar::F32), ("f64", Scalar::F64)] {
+                    add(label.to_owned(), &|s| {
+                        s.scene.accuracy.contact_scalar = scalar
+                    });
                 }
             }
             Axis::Quadrature => {

@@ -352,7 +352,7 @@ fn rest_problem(ready: &Touchable, pose: &DPose3, expected: &Value) -> Result<Va
     let mut matrix = vec![0.0; m * m];
     for (j, b) in rows.iter().enumerate() {
         for (i, a) in rows.iter().enumerate() {
-            matrix[j * m + i] = a.1.dot(*ready.part.block(a.0, b.0) * b.1);
+            matrix[j * m + i] = a.1.dot(ready.part.block(a.0, b.0) * b.1);
         }
     }
     // C is symmetric to round-off; the problem is to be so to the bit.

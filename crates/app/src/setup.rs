@@ -192,9 +192,17 @@ fn with_field(
 /// The engine of a scene.
 ///
 /// # Errors
-/// Settings that the crates refuse.
+/// Settings that the crates refuse; a distance of near nodes beyond the part's size.
 pub fn engine(scene: &Scene, prepared: &PreparedPart, tool: Tool) -> Result<Engine, Error> {
-    let size = part_extent(&prepared.loaded.mesh).min(tool.characteristic_size());
+    let extent = part_extent(&prepared.loaded.mesh);
+    if let Some(near) = scene.accuracy.near_distance.filter(|near| *near > extent) {
+        return Err(Error::Input(format!(
+            "{}: accuracy.near_distance of {near} m is more than the whole part measures ({extent:.3} m), so every node \
+             would get a contact plane; leave it out, or write some thousandths of the tool's size",
+            scene.path.display(),
+        )));
+    }
+    let size = extent.min(tool.characteristic_size());
     let settings = EngineSettings {
         contact_iterations: match scene.accuracy.contact_iterations {
             scene::ContactIterations::Converged => ContactIterations::Converged,

@@ -324,3 +324,19 @@ fn a_part_without_interface_nodes_cannot_constrain_them() {
         outcome.err
     );
 }
+
+/// A margin of nothing and one that takes in the whole part; both mend by leaving it out.
+#[test]
+fn a_distance_of_near_nodes_of_nothing_or_beyond_the_part_is_refused() {
+    for (value, expected) in [("0.0", "near_distance"), ("0.5", "leave it out")] {
+        let dir = tempfile::tempdir().unwrap();
+        let scene = scene_with(dir.path(), |text| {
+            let key = format!("[accuracy]\nnear_distance = {value}\n\n[tool]");
+            text.replace("[tool]", &key)
+        });
+        let outcome = run(&scene);
+        assert_eq!(outcome.code, 2, "{}", outcome.err);
+        let says = |part: &str| outcome.err.contains(part);
+        assert!(says("clip.toml") && says(expected), "{}", outcome.err);
+    }
+}

@@ -224,6 +224,37 @@ mod tests {
     }
 
     #[test]
+    fn columns_are_fetched_where_they_fit_and_refused_where_not() {
+        let mut spec = clip().spec;
+        spec.refinements = 1;
+        let mut part = load(&spec).unwrap();
+        let forecast = Forecast::of(&part);
+        assert!(!forecast.fetches_columns(&part));
+        part.spec.columns = ColumnChoice::Auto;
+        assert!(!forecast.fetches_columns(&part), "all of it fits");
+        part.spec.columns = ColumnChoice::Near;
+        assert!(forecast.fetches_columns(&part));
+        // Room for some columns beside the factor, for all, for too few.
+        let of_column = column_bytes(part.rows.len(), Scalar::F64);
+        let room = |n: f64| forecast.factor_bytes + n * of_column / SHARE_OF_COLUMNS;
+        let n_all = part.candidates.len();
+        assert!(n_all > 300, "{n_all}");
+        let some = forecast.columns_within(&part, room(300.5)).unwrap();
+        assert_eq!(some, 300);
+        assert_eq!(forecast.columns_within(&part, 1e12).unwrap(), n_all);
+        for free in [room(200.0), 0.0] {
+            let refusal = forecast
+                .columns_within(&part, free)
+                .unwrap_err()
+                .to_string();
+            assert!(
+                refusal.contains("clip.msh") && refusal.contains("coarsen the mesh"),
+                "{refusal}"
+            );
+        }
+    }
+
+    #[test]
     fn sizes_and_times_are_readable() {
         assert_eq!(bytes(999.0), "999 B");
         assert_eq!(bytes(1.5e9), "1.5 GB");

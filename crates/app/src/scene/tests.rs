@@ -476,6 +476,10 @@ fn refusals_name_line_key_and_mend() {
             "clip.toml:22: unknown key `raduis`; the nearest is `radius`",
         ),
         (
+            adding("[accuracy]\nadaptive = 1\ncolumns = \"near\"\n"),
+            "clip.toml:23: columns \"near\" and adaptive do not go together; leave columns out, or write adaptive = \"off\"",
+        ),
+        (
             adding("[accuracy]\nmultiply = \"gpu\"\n"),
             "clip.toml:22: multiply \"gpu\" is not in this version; use \"auto\" or \"cpu\"",
         ),
@@ -539,6 +543,9 @@ fn a_preset_sets_all_and_a_key_beside_it_wins() {
         scene.accuracy.contact_iterations,
         ContactIterations::Times(2)
     );
+    let scene = adding("[accuracy]\ncontact_scalar = \"f32\"\ncolumns = \"near\"\n").unwrap();
+    assert_eq!(scene.accuracy.contact_scalar, Scalar::F32);
+    assert_eq!(scene.accuracy.columns, Columns::Near);
     let scene = with("title = \"Clip\"", "accuracy = { budget_us = 200 }").unwrap();
     assert_eq!(scene.accuracy.budget_us, Some(200.0));
 }

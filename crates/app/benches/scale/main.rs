@@ -3,14 +3,19 @@
 //! Measures: a rigid sphere pressed into an elastic half-space with a square grid of nodes 1 mm apart that can
 //! all touch (displacements by Boussinesq and Cerruti, see Johnson, Contact Mechanics, 3.2 and 3.6), then slid over
 //! it in steps of 20 um with a slow bob, its pose imposed. Only steps with contact count.
-//! `cargo bench -p snapin --bench scale` runs it on one core (a minute) and prints the tables;
-//! with `SNAPIN_WRITE_DOCS=1` it writes them into `docs/performance.md`.
+//! The size of the part is varied with the columns of the nodes that the sphere can meet alone, so that 100 000 nodes
+//! fit; all nodes are candidates that the step must rule out.
+//! `cargo bench -p snapin --bench scale` runs it on one core (two minutes, 4 GB) and prints the tables;
+//! with `SNAPIN_WRITE_DOCS=1` it writes them into `docs/performance.md` and plots them.
 
 #![allow(
     clippy::unwrap_used,
     clippy::print_stdout,
     reason = "a benchmark prints, and ends where it cannot go on"
 )]
+
+mod half_space;
+mod plot;
 
 use std::fmt::Write;
 use std::path::Path;
@@ -20,56 +25,17 @@ use std::time::Instant;
 use contact::tool::{DistanceField, Mesh, Sphere, Tool};
 use glam::DVec3;
 use glamx::DPose3;
+use half_space::{CELL, half_space, half_space_near};
 use snapin::engine::{ContactIterations, ContactPart, Engine, EngineSettings, Stage};
 use snapin::machine::Machine;
-
-/// m, of a cell.
-const CELL: f64 = 1e-3;
 
 /// m, motion of the tool in one step of 1 ms.
 const STRIDE: f64 = 2e-5;
 
 const STEPS: u32 = 1500;
 
-/// An elastic half-space (silicone, 5 MPa) with side x side nodes.
-fn half_space(side: usize) -> Arc<ContactPart> {
-    const YOUNG_MODULUS: f64 = 5e6;
-    const NU: f64 = 0.45;
-    let middle = 0.5 * (side as f64 - 1.0);
-    let rest: Vec<DVec3> = (0..side * side)
-        .map(|k| CELL * DVec3::new((k % side) as f64 - middle, (k / side) as f64 - middle, 0.0))
-        .collect();
-    let scale = (1.0 + NU) / (std::f64::consts::PI * YOUNG_MODULUS);
-    let mut blocks = vec![0.0; 9 * rest.len() * rest.len()];
-    for (block, k) in blocks.chunks_exact_mut(9).zip(0..) {
-        let d = rest[k % rest.len()] - rest[k / rest.len()];
-        let r = d.length();
-        let entries = if r == 0.0 {
-            // Means over the node's square: of 1/r 3.5255 / CELL, of x²/r² a half.
-            let mean = 3.5255 / CELL * scale;
-            let (along, normal) = (mean * (1.0 - 0.5 * NU), mean * (1.0 - NU));
-            [along, 0.0, 0.0, 0.0, along, 0.0, 0.0, 0.0, normal]
-        } else {
-            let (x, y, s) = (d.x / r, d.y / r, scale / r);
-            let (shear, skew) = (NU * x * y, 0.5 * (1.0 - 2.0 * NU));
-            // Columns: displacement under a force in x, in y, in z.
-            [
-                1.0 - NU + NU * x * x,
-                shear,
-                skew * x,
-                shear,
-                1.0 - NU + NU * y * y,
-                skew * y,
-                -skew * x,
-                -skew * y,
-                1.0 - NU,
-            ]
-            .map(|c| c * s)
-        };
-        block.copy_from_slice(&entries);
-    }
-    Arc::new(ContactPart::new(rest.clone(), rest.len(), blocks))
-}
+/// m, half of the way that the tool slides.
+const HALF_WAY: f64 = 5e-3;
 
 struct Measured {
     contacts: f64,
@@ -97,8 +63,8 @@ fn measure(part: &Arc<ContactPart>, tool: Tool, radius: f64, contacts: f64) -> M
     for step in 0..STEPS {
         let t = f64::from(step);
         let pressed = (t / 300.0).min(1.0) * (1.0 + 0.02 * (0.05 * t).sin());
-        let slid = STRIDE * (t - 300.0).max(0.0) - 0.005;
-        let at = DVec3::new(slid.min(0.005), 0.3 * slid, radius - pressed * depth);
+        let slid = STRIDE * (t - 300.0).max(0.0) - HALF_WAY;
+        let at = DVec3::new(slid.min(HALF_WAY), 0.3 * slid, radius - pressed * depth);
         let begun = Instant::now();
         let report = engine.step(&DPose3::from_translation(at));
         let total = 1e-3 * begun.elapsed().as_nanos() as f64;
@@ -106,6 +72,10 @@ fn measure(part: &Arc<ContactPart>, tool: Tool, radius: f64, contacts: f64) -> M
             continue;
         }
         assert!(report.lcp_solved && report.converged && report.dropped == 0);
+        assert_eq!(
+            report.without_column, 0,
+            "the sphere meets nodes without a column"
+        );
         totals.push(total);
         n_contacts += report.contacts;
         near += report.near;
@@ -196,26 +166,26 @@ fn main() {
     )
     .unwrap();
     text += &header("nodes that can touch");
-    let mut part = half_space(15);
-    for side in [15, 26, 40, 55] {
-        part = half_space(side);
-        text += &row(
-            (side * side).to_string(),
-            &measure(&part, sphere(0.03), 0.03, 62.0),
-        );
+    let mut of_size = Vec::new();
+    for side in [15, 26, 55, 100, 178, 316] {
+        let part = half_space_near(side, HALF_WAY + 8e-3);
+        let m = measure(&part, sphere(0.03), 0.03, 62.0);
+        text += &row((side * side).to_string(), &m);
+        of_size.push(((side * side) as f64, m));
     }
+    let part = half_space(55);
     writeln!(
         text,
         "\nContacts, on 3025 nodes, sphere of 30 mm (100 mm from 250 on):\n"
     )
     .unwrap();
     text += &header("aim");
+    let mut of_contacts = Vec::new();
     for contacts in [5.0, 15.0, 30.0, 62.0, 120.0, 250.0, 500.0] {
         let radius = if contacts < 200.0 { 0.03 } else { 0.1 };
-        text += &row(
-            format!("{contacts}"),
-            &measure(&part, sphere(radius), radius, contacts),
-        );
+        let m = measure(&part, sphere(radius), radius, contacts);
+        text += &row(format!("{contacts}"), &m);
+        of_contacts.push((m.contacts, m));
     }
     writeln!(
         text,
@@ -223,11 +193,14 @@ fn main() {
     )
     .unwrap();
     text += &header("triangles");
+    let mut of_triangles = Vec::new();
     for rings in [8, 24, 72, 224] {
         let (vertices, triangles) = sphere_mesh(0.03, rings);
         let n = triangles.len();
         let tool = Tool::Mesh(Mesh::new(&vertices, &triangles).unwrap().into());
-        text += &row(n.to_string(), &measure(&part, tool.clone(), 0.03, 62.0));
+        let m = measure(&part, tool.clone(), 0.03, 62.0);
+        text += &row(n.to_string(), &m);
+        of_triangles.push((n as f64, m));
         if rings == 224 {
             // As a scene's tool.field_error = 1 um.
             let field = DistanceField::new(tool, 1e-6, 6e-4, 1 << 30).unwrap();
@@ -242,6 +215,18 @@ fn main() {
         let (begin, end) = ("<!-- step: begin -->\n", "<!-- step: end -->");
         let (before, rest) = old.split_once(begin).unwrap();
         let (_, after) = rest.split_once(end).unwrap();
-        std::fs::write(page, format!("{before}{begin}{text}{end}{after}")).unwrap();
+        std::fs::write(&page, format!("{before}{begin}{text}{end}{after}")).unwrap();
+        for (file, axis, measured) in [
+            ("step-over-size.svg", "nodes that can touch", &of_size),
+            ("step-over-contacts.svg", "contacts", &of_contacts),
+            (
+                "step-over-triangles.svg",
+                "triangles of the tool",
+                &of_triangles,
+            ),
+        ] {
+            let image = page.with_file_name("images").join(file);
+            std::fs::write(image, plot::stages(axis, measured)).unwrap();
+        }
     }
 }

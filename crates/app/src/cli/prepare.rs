@@ -60,7 +60,7 @@ fn table(prepared: &PreparedPart) -> String {
         bytes(prepared.compliance.bytes()),
     );
     for (stage, seconds) in &prepared.seconds {
-        text += &format!("  {stage:<22}{}\n", duration(*seconds));
+        text += &format!("  {stage:<24}{}\n", duration(*seconds));
     }
     let checks = &prepared.checks;
     text += &format!(

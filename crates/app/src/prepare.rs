@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use fem::{
-    BubbleCompliance, Compliance, ComplianceChecks, FactoredStiffness, Material, Mesh, Order,
+    BubbleCompliance, Compliance, ComplianceChecks, Material, Mesh, Order, OrderedStiffness,
     Quadrature, Supports,
 };
 use glam::DVec3;
@@ -378,7 +378,11 @@ fn build(loaded: &LoadedPart, ui: &Ui<'_>) -> Result<Built, Error> {
     };
     let stiffness = assemble(loaded)?;
     done("assemble the stiffness", &mut seconds);
-    let factor = FactoredStiffness::new(&stiffness, &loaded.supports, &progress)
+    let ordered = OrderedStiffness::new(&stiffness, &loaded.supports, &progress)
+        .map_err(|e| Error::part(path, e))?;
+    done("order the unknowns", &mut seconds);
+    let factor = ordered
+        .factor(&progress)
         .map_err(|e| Error::part(path, e))?;
     done("factor", &mut seconds);
     let compliance = Compliance::build(&factor, &loaded.candidates, &loaded.rows, &progress)

@@ -11,6 +11,7 @@ use crate::Error;
 use crate::assembly::Stiffness;
 use crate::columns::{Panel, SupernodeTree};
 use crate::factor::FactoredStiffness;
+use crate::ordered::HELD;
 use crate::progress::Progress;
 
 /// Nodes solved for at a time, three right-hand sides each: larger panels cost more memory and are
@@ -240,9 +241,6 @@ struct Plan<'a> {
     /// Positions of the components of each row, [`HELD`] if held.
     places: Vec<[u32; 3]>,
 }
-
-/// Component that is held and does not move.
-const HELD: u32 = u32::MAX;
 
 impl<'a> Plan<'a> {
     fn new(factor: &'a FactoredStiffness, candidates: &[u32], rows: &[u32]) -> Self {

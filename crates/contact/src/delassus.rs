@@ -39,7 +39,22 @@ pub fn delassus_into(
     w: &mut [f64],
 ) -> Result<(), Error> {
     let m = planes.len();
-    if w.len() != m * m {
+    delassus_block_into(compliance, planes, coupling, m, w)
+}
+
+/// As [`delassus_into`], for the leading block of an operator with `m` rows, more than there are planes: what follows are
+/// rows of another kind ([`crate::face_row`]).
+///
+/// # Errors
+/// [`Error::Length`] unless `w` has m² entries and m is no less than the number of planes.
+pub fn delassus_block_into(
+    compliance: &impl ComplianceBlocks,
+    planes: &[Plane],
+    coupling: Option<CouplingCompliance>,
+    m: usize,
+    w: &mut [f64],
+) -> Result<(), Error> {
+    if w.len() != m * m || m < planes.len() {
         return Err(Error::Length {
             what: "the Delassus operator",
             expected: m * m,
@@ -64,7 +79,7 @@ pub fn delassus_into(
 }
 
 /// K_c⁻¹ h of one plane: how far the tool yields to a unit normal force.
-fn twist_per_force(coupling: &CouplingCompliance, plane: &Plane) -> (DVec3, DVec3) {
+pub(crate) fn twist_per_force(coupling: &CouplingCompliance, plane: &Plane) -> (DVec3, DVec3) {
     let row = plane.tool_row(coupling.reference);
     let twist = coupling
         .matrix

@@ -41,7 +41,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// Both scenes, pushed in and pulled out again, a jump of the handle and a pose that is refused; the
+/// All scenes, pushed in and pulled out again, a jump of the handle and a pose that is refused; the
 /// clip also with free nodes chosen, built and blended in on the way, and its shape drawn.
 #[test]
 fn no_step_of_an_insertion_allocates() {
@@ -49,6 +49,7 @@ fn no_step_of_an_insertion_allocates() {
     for (name, adaptive) in [
         ("clip.toml", Adaptive::Off),
         ("hook.toml", Adaptive::Off),
+        ("edge.toml", Adaptive::Off),
         ("clip.toml", on(PMethod::Select, FreeNodes::Indicator(1e-3))),
         ("clip.toml", on(PMethod::Constrain, FreeNodes::Radius(3e-3))),
     ] {

@@ -9,6 +9,7 @@
 
 mod clock;
 mod constrained;
+mod edges;
 mod pairs;
 mod part;
 mod report;
@@ -21,7 +22,8 @@ use std::sync::Arc;
 use contact::delassus::{CouplingCompliance, delassus_into};
 use contact::lcp;
 use contact::plane::{planes_and_rest_into, planes_into, wrench_on_tool};
-use contact::tool::Tool;
+use contact::surface::Surface;
+use contact::tool::{Features, Tool};
 use device::VirtualCoupling;
 use glam::DVec3;
 use glamx::DPose3;
@@ -31,6 +33,7 @@ use crate::free_nodes::LOOSE_RADIUS;
 use clock::StageClock;
 use constrained::Constrained;
 pub use constrained::{BubbleData, FreeSettings, MOST_FREE};
+use edges::{Edges, Positions};
 pub use part::ContactPart;
 use part::Deformed;
 pub use report::{ActiveContact, N_STAGES, Stage, StepReport};
@@ -99,6 +102,8 @@ pub struct Engine {
     last_wrench: [f64; 6],
     /// The p-method by Galerkin, where the scene asks for it.
     constrained: Option<Box<Constrained>>,
+    /// Corners and edges of the tool between the nodes, where it has some.
+    edges: Option<Box<Edges>>,
 }
 
 impl Engine {
@@ -136,9 +141,29 @@ impl Engine {
             deviation: [0.0; 6],
             last_wrench: [0.0; 6],
             constrained: None,
+            edges: None,
             part,
             tool,
         })
+    }
+
+    /// Has the tool's corners and edges touch the faces of the part between its nodes, too.
+    ///
+    /// The tool then moves in one go by no more than a quarter of the least height of an element behind a face.
+    ///
+    /// # Panics
+    /// If interface nodes are constrained: their faces do not follow the candidates alone (a programmer's mistake).
+    pub fn with_edges(mut self, surface: Surface, features: Features) -> Self {
+        assert!(self.constrained.is_none(), "all interface nodes are free");
+        let n_candidates = self.part.n_candidates();
+        let stride = Edges::max_stride(&surface);
+        self.settings.max_stride = self.settings.max_stride.min(stride);
+        self.scratch.reserve_contacts(n_candidates);
+        let max_rows = self.scratch.max_rows();
+        let near_distance = self.settings.near_distance;
+        let edges = Edges::new(surface, features, near_distance, n_candidates, max_rows);
+        self.edges = Some(Box::new(edges));
+        self
     }
 
     /// An engine whose part has constrained interface nodes, some of which are freed on the way.
@@ -202,6 +227,9 @@ impl Engine {
         self.last_wrench = [0.0; 6];
         if let Some(constrained) = &mut self.constrained {
             constrained.reset();
+        }
+        if let Some(edges) = &mut self.edges {
+            edges.reset();
         }
     }
 
@@ -285,6 +313,9 @@ impl Engine {
             ContactIterations::Fixed(n) => (n.max(1), 0.0),
         };
         self.scratch.begin_stride();
+        if let Some(edges) = &mut self.edges {
+            edges.begin_stride();
+        }
         report.passes = 0;
         report.converged = false;
         let mut tool_pose = VirtualCoupling::pose_from_deviation(target, &self.deviation);
@@ -310,7 +341,8 @@ impl Engine {
             report.converged = true;
         }
         report.tool_pose = tool_pose;
-        report.contacts = self.scratch.active.len() as u32;
+        let on_faces = self.edges.as_ref().map_or(0, |edges| edges.n_carried());
+        report.contacts = (self.scratch.n_own + on_faces) as u32;
         self.balance(target, report);
     }
 
@@ -405,6 +437,26 @@ impl Engine {
             planes_into(tool, &pose, missing, position_of, f64::INFINITY, extra);
         }
         self.scratch.keep_seen();
+        // One row for each point of the tool's edges at a face.
+        if let Some(edges) = &mut self.edges {
+            let room = self.scratch.max_rows() - self.scratch.planes.len();
+            let Scratch {
+                planes,
+                active,
+                known,
+                pairs,
+                ..
+            } = &mut self.scratch;
+            let deformed = Deformed {
+                part,
+                active,
+                constrained,
+                pairs,
+            };
+            let mut positions = Positions { deformed, known };
+            let moved = self.watch.moved();
+            report.dropped += edges.find(&mut positions, &pose, moved, planes, room) as u32;
+        }
         let Scratch {
             planes,
             u_before,
@@ -413,7 +465,9 @@ impl Engine {
             pairs,
             ..
         } = &mut self.scratch;
-        report.near = planes.len() as u32;
+        let n_planes = planes.len();
+        let m = n_planes + self.edges.as_ref().map_or(0, |edges| edges.rows().len());
+        report.near = m as u32;
         u_before.clear();
         u_before.extend(
             planes
@@ -423,7 +477,6 @@ impl Engine {
         clock.lap(Stage::Planes, report);
 
         // q: the gap that remains at zero contact force.
-        let m = planes.len();
         for ((q, plane), u) in q.iter_mut().zip(planes.iter()).zip(u_before.iter()) {
             let along: f64 = plane
                 .tool_row(reference)
@@ -432,6 +485,9 @@ impl Engine {
                 .map(|(h, e)| h * e)
                 .sum();
             *q = plane.gap - plane.normal.dot(*u) + along;
+        }
+        if let Some(edges) = &self.edges {
+            edges.gaps_into(reference, &self.deviation, &mut q[n_planes..]);
         }
         // W: compliance of part and coupling seen along the contact normals. Not needed where all
         // gaps are open without force: then z = 0 is the exact answer.
@@ -442,15 +498,16 @@ impl Engine {
                 .as_ref()
                 .map(|matrix| CouplingCompliance { matrix, reference });
             let w = &mut w_matrix[..m * m];
-            let assembled = match &mut self.constrained {
-                None => {
+            let assembled = match (&mut self.constrained, &mut self.edges) {
+                (None, Some(edges)) => edges.delassus_into(pairs, part, planes, coupling, w),
+                (None, None) => {
                     if pairs.ensure(planes.iter().map(|plane| plane.candidate), part) {
                         delassus_into(&*pairs, planes, coupling, w)
                     } else {
                         delassus_into(part, planes, coupling, w)
                     }
                 }
-                Some(constrained) => {
+                (Some(constrained), _) => {
                     let candidates = planes.iter().map(|plane| plane.candidate);
                     constrained.ensure(candidates, &[], part);
                     delassus_into(constrained.blocks(), planes, coupling, w)
@@ -464,16 +521,30 @@ impl Engine {
             self.scratch.z[..m].fill(0.0);
             (report.certificate, report.lcp_solved) = (0.0, true);
         } else {
-            self.scratch.solve(m, &self.settings.lcp, report);
+            let edges = self.edges.as_deref();
+            self.scratch.solve(m, edges, &self.settings.lcp, report);
         }
         clock.lap(Stage::Lcp, report);
 
         // Forces of the near nodes become the state; the tool goes where its coupling balances.
-        self.scratch.adopt_forces(m);
+        self.scratch.adopt_forces(n_planes);
         if let Some(constrained) = &mut self.constrained {
             constrained.forget_terms();
         }
-        let (force, torque) = wrench_on_tool(&self.scratch.planes, &self.scratch.z[..m], reference);
+        let z = &self.scratch.z[..m];
+        let (mut force, mut torque) = wrench_on_tool(&self.scratch.planes, z, reference);
+        if let Some(edges) = &mut self.edges {
+            let Scratch {
+                z,
+                active,
+                was_active,
+                ..
+            } = &mut self.scratch;
+            let z = &z[n_planes..m];
+            edges.adopt_forces(z, active, was_active);
+            let on_tool = edges.wrench_on_tool(z, reference);
+            (force, torque) = (force + on_tool.0, torque + on_tool.1);
+        }
         report.contact_wrench_on_tool = [force.x, force.y, force.z, torque.x, torque.y, torque.z];
         if let Some(compliance) = &self.coupling_compliance {
             self.deviation = compliance.map(|row| {
@@ -508,6 +579,10 @@ impl Engine {
                 known.set(plane.candidate as usize, u);
             }
             change = change.max((u - *before).length());
+        }
+        if let Some(edges) = &self.edges {
+            let mut positions = Positions { deformed, known };
+            change = change.max(edges.largest_change(&mut positions));
         }
         clock.lap(Stage::Update, report);
         change

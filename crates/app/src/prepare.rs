@@ -7,6 +7,7 @@
 mod bubbles;
 pub mod budget;
 pub mod cache;
+mod surface;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;

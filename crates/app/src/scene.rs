@@ -342,6 +342,8 @@ pub struct Accuracy {
     pub lcp_rounds: Option<usize>,
     /// Planes kept in one step, the deepest first.
     pub max_contacts: usize,
+    /// Whether the tool's corners and edges touch the part between its nodes.
+    pub tool_features: ToolFeatures,
     /// Number type of the displacement multiply.
     pub scalar: Scalar,
     /// Where the displacement multiply runs.
@@ -360,6 +362,7 @@ impl Accuracy {
             lcp_tolerance: raw::default::LCP_TOLERANCE,
             lcp_rounds: None,
             max_contacts: raw::default::MAX_CONTACTS as usize,
+            tool_features: ToolFeatures::Auto,
             scalar: Scalar::F64,
             multiply: Multiply::Auto,
         };
@@ -426,6 +429,21 @@ impl Adaptive {
             PMethod::Constrain => format!("{which} (constrain)"),
         }
     }
+}
+
+/// Whether the tool's corners and sharp edges touch the part's faces between its nodes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ToolFeatures {
+    /// If the tool has some and the contact groups have faces.
+    #[default]
+    Auto,
+    /// Or else an error, which names this line of the scene.
+    On {
+        /// Line of the key.
+        line: usize,
+    },
+    /// Contact at the part's nodes only.
+    Off,
 }
 
 /// Bend of an edge, as a share of the largest displacement, that a picture of a thousand pixels

@@ -106,7 +106,7 @@ impl ContactPart {
     pub fn displacement_bound(&self, active: &[ActiveContact]) -> f64 {
         active
             .iter()
-            .map(|c| self.largest_block[c.candidate as usize] * c.normal_force.abs())
+            .map(|c| self.largest_block[c.candidate as usize] * c.force_on_part.length())
             .sum()
     }
 }

@@ -4,6 +4,7 @@ use contact::lcp;
 use contact::plane::Plane;
 use glam::DVec3;
 
+use super::edges::Edges;
 use super::pairs::Pairs;
 use super::{ActiveContact, StepReport};
 
@@ -39,6 +40,8 @@ pub(super) struct Scratch {
     pub(super) was_active: Vec<bool>,
     /// Contacts that carry force: the state between passes and steps.
     pub(super) active: Vec<ActiveContact>,
+    /// The first of them carry force of a plane of their own.
+    pub(super) n_own: usize,
     lcp: lcp::Scratch,
     /// Contacts set aside while another operator is tried.
     saved: Vec<ActiveContact>,
@@ -69,6 +72,7 @@ impl Scratch {
             warm: vec![false; rows],
             was_active: vec![false; n_candidates],
             active: Vec::with_capacity(rows),
+            n_own: 0,
             lcp: lcp::Scratch::new(rows),
             saved: Vec::with_capacity(rows),
             centres: Vec::with_capacity(n_candidates),
@@ -97,12 +101,14 @@ impl Scratch {
         for contact in &self.active {
             self.was_active[contact.candidate as usize] = true;
         }
+        self.n_own = self.active.len();
         self.known.forget();
     }
 
     pub(super) fn clear_contacts(&mut self) {
         self.known.forget();
         self.active.clear();
+        self.n_own = 0;
         self.was_active.fill(false);
     }
 
@@ -110,7 +116,7 @@ impl Scratch {
     pub(super) fn begin_stride(&mut self) {
         self.stride += 1;
         self.seen.clear();
-        for contact in &self.active {
+        for contact in &self.active[..self.n_own] {
             self.stride_of[contact.candidate as usize] = self.stride;
             self.seen.push(contact.candidate);
         }
@@ -145,10 +151,23 @@ impl Scratch {
         }
     }
 
-    /// Solves `w = q + W z` for the `m` planes, warm-started from the nodes that carried force.
-    pub(super) fn solve(&mut self, m: usize, settings: &lcp::Settings, report: &mut StepReport) {
+    /// Solves `w = q + W z` for the `m` rows, those of the planes first, warm-started from the nodes, and the points of
+    /// `edges`, that carried force.
+    pub(super) fn solve(
+        &mut self,
+        m: usize,
+        edges: Option<&Edges>,
+        settings: &lcp::Settings,
+        report: &mut StepReport,
+    ) {
         for (warm, plane) in self.warm.iter_mut().zip(&self.planes) {
             *warm = self.was_active[plane.candidate as usize];
+        }
+        if let Some(edges) = edges {
+            let warm = self.warm[self.planes.len()..].iter_mut();
+            for (warm, row) in warm.zip(edges.rows()) {
+                *warm = edges.is_carried(row);
+            }
         }
         let z = &mut self.z[..m];
         let solution = lcp::Problem::trusted_symmetric(&self.w_matrix[..m * m], &self.q[..m])
@@ -193,6 +212,12 @@ impl Scratch {
                 });
             }
         }
+        self.n_own = self.active.len();
+    }
+
+    /// Makes room for contacts on all candidates, as faces load many for one row.
+    pub(super) fn reserve_contacts(&mut self, n_candidates: usize) {
+        self.active.reserve(n_candidates);
     }
 }
 

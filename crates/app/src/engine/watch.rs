@@ -103,6 +103,11 @@ impl Watch {
         &self.watched
     }
 
+    /// How far tool and part have moved at most since the start, m.
+    pub(super) fn moved(&self) -> f64 {
+        self.moved
+    }
+
     /// Makes the next [`Self::look`] begin anew.
     pub(super) fn forget(&mut self) {
         self.pose_then = None;

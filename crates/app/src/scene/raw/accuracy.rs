@@ -77,6 +77,18 @@ pub(in crate::scene) enum MultiplyRaw {
     Gpu,
 }
 
+/// Whether the tool's corners and edges touch the part between its nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub(in crate::scene) enum ToolFeaturesRaw {
+    /// if the tool has some and the contact groups have faces.
+    Auto,
+    /// or else an error.
+    On,
+    /// contact at the part's nodes only.
+    Off,
+}
+
 /// One word for all settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
@@ -261,6 +273,12 @@ pub(in crate::scene) struct AccuracyKeys {
     /// counted and reported.
     #[schemars(range(min = 1, max = 5000), extend("default" = default::MAX_CONTACTS))]
     pub(in crate::scene) max_contacts: Option<At<i64>>,
+    /// Corners and sharp edges of the tool (a box, a cylinder of finite length, a mesh that bends by more than 20 degrees)
+    /// against the part's faces between its nodes: each point of them at a face is one more contact plane, of
+    /// `max_contacts` too. Without it contact acts at nodes only, and what comes between them is not seen. Edges
+    /// are sampled at half the part's smallest face. A step then takes some 0.1 ms on the shipped hook (docs/performance.md). Not with `adaptive`'s method `"constrain"`.
+    #[schemars(extend("default" = "auto"))]
+    pub(in crate::scene) tool_features: Option<At<ToolFeaturesRaw>>,
     /// Number type of the displacement multiply; forces are always computed in f64.
     #[schemars(extend("default" = "f64"))]
     pub(in crate::scene) scalar: Option<At<ScalarRaw>>,

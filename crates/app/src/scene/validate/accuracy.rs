@@ -1,12 +1,14 @@
 //! `[accuracy]`: presets resolved, ranges checked, SI.
 
+use super::super::error::line_of;
 use super::super::raw::{
     AccuracyKeys, AdaptiveKeys, AdaptiveRaw, At, IterationsRaw, MethodRaw, MultiplyRaw, PresetRaw,
-    ScalarRaw, default,
+    ScalarRaw, ToolFeaturesRaw, default,
 };
 use super::super::units::Quantity;
 use super::super::{
-    Accuracy, Adaptive, ContactIterations, FreeNodes, Multiply, PMethod, Preset, Scalar, SceneError,
+    Accuracy, Adaptive, ContactIterations, FreeNodes, Multiply, PMethod, Preset, Scalar,
+    SceneError, ToolFeatures,
 };
 use super::{Check, Range};
 
@@ -59,6 +61,7 @@ impl Check<'_> {
                 None => None,
             },
             max_contacts: max_contacts as usize,
+            tool_features: self.tool_features(raw)?,
             scalar: match raw.scalar.as_ref().map(|at| at.value) {
                 Some(ScalarRaw::F32) => Scalar::F32,
                 Some(ScalarRaw::F64) => Scalar::F64,
@@ -182,6 +185,28 @@ impl Check<'_> {
             },
             free,
         })
+    }
+
+    fn tool_features(&self, raw: &AccuracyKeys) -> Result<ToolFeatures, SceneError> {
+        let Some(at) = &raw.tool_features else {
+            return Ok(ToolFeatures::Auto);
+        };
+        let constrain = match raw.adaptive.as_ref().map(|at| &at.value) {
+            Some(AdaptiveRaw::Keys(keys)) => matches!(keys.method, Some(MethodRaw::Constrain)),
+            _ => false,
+        };
+        match at.value {
+            ToolFeaturesRaw::Auto => Ok(ToolFeatures::Auto),
+            ToolFeaturesRaw::Off => Ok(ToolFeatures::Off),
+            ToolFeaturesRaw::On if constrain => Err(self.error(
+                at.offset,
+                "tool_features \"on\" does not go with adaptive's method \"constrain\"".to_owned(),
+                "use method \"select\", which has the same forces as no adaptive, or tool_features \"off\"",
+            )),
+            ToolFeaturesRaw::On => Ok(ToolFeatures::On {
+                line: line_of(self.source, at.offset),
+            }),
+        }
     }
 
     fn radius(&self, at: &At<f64>) -> Result<f64, SceneError> {

@@ -23,7 +23,7 @@ pub const NO_FACE: u32 = u32::MAX;
 /// meet at less.
 const SMOOTH_DEGREES: f64 = 35.0;
 
-/// Tangent of a little more than half of [`SMOOTH_DEGREES`]: how far a point between two faces' normals is aside of
+/// Tangent of a little more than half of the bend up to which a border is smooth, 35 degrees: how far a point between two faces' normals is aside of
 /// either, for its height.
 pub const SMOOTH_SLOPE: f64 = 0.36;
 

@@ -8,10 +8,14 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use device::Wrench;
 use glamx::DPose3;
+use snapin::engine::StepReport;
 use snapin::prepare::{PrepareOptions, prepare};
 use snapin::progress::Ui;
 use snapin::scene::{Adaptive, FreeNodes, PMethod, Scene};
+use snapin::session::fast::FastSettings;
+use snapin::session::slow::Stepped;
 use snapin::setup;
 use snapin::shape::Shape;
 use snapin_tests::root;
@@ -41,9 +45,15 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
+/// One after the other, because all threads share the counter.
+#[test]
+fn nothing_in_the_haptic_loop_allocates() {
+    no_step_of_an_insertion_allocates();
+    no_tick_of_two_rates_allocates();
+}
+
 /// Both scenes, pushed in and pulled out again, a jump of the handle and a pose that is refused; the
 /// clip also with free nodes chosen, built and blended in on the way, and its shape drawn.
-#[test]
 fn no_step_of_an_insertion_allocates() {
     let on = |method, free| Adaptive::On { method, free };
     for (name, adaptive) in [
@@ -85,4 +95,40 @@ fn no_step_of_an_insertion_allocates() {
         assert!(touched > 100, "{name}: contact in {touched} steps only");
         assert_eq!(after - before, 0, "{name} {adaptive:?}");
     }
+}
+
+/// The fast loop of two rates, with the engine's work in turns: solving, hand-overs and freezing take no memory.
+fn no_tick_of_two_rates_allocates() {
+    let scene = Scene::load(&root().join("scenes/clip.toml")).unwrap();
+    let mut unseen = std::io::sink();
+    let ui = Ui::new(&mut unseen, false);
+    let spec = setup::part_spec(&scene).unwrap();
+    let prepared = prepare(&spec, &PrepareOptions::default(), &ui).unwrap();
+    let (tool, _) = setup::tool(&scene).unwrap();
+    let mut engine = setup::engine(&scene, &prepared, tool).unwrap();
+    let start = scene.tool.pose_part_tool;
+    let at = |share: f64| DPose3 {
+        translation: start.translation + share * scene.hand.travel * scene.hand.direction,
+        ..start
+    };
+    let on_handle = |report: &StepReport| Wrench::from_array(&report.coupling_wrench_on_tool);
+    let settings = FastSettings {
+        period_s: 1e-3,
+        force_resolution: 0.2,
+        lever: 0.02,
+        n_ticks: 2000,
+    };
+    let mut stepped = Stepped::new(&mut engine, &start, 4, settings).unwrap();
+    let before = ALLOCATIONS.load(Ordering::Relaxed);
+    let mut touched = 0;
+    for (tick, k) in (0..=700).chain((0..=700).rev()).enumerate() {
+        let target = at(f64::from(k) / 700.0);
+        let answer = stepped.tick(tick as u64, &target, on_handle);
+        touched += u32::from(answer.report.contacts > 0);
+        stepped.work(&mut engine, tick as u64, &target);
+    }
+    let after = ALLOCATIONS.load(Ordering::Relaxed);
+    assert!(touched > 100, "contact in {touched} ticks only");
+    assert_eq!(after - before, 0);
+    assert!(stepped.fast().log().hand_overs.len() > 300);
 }

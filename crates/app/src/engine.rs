@@ -9,6 +9,7 @@
 
 mod clock;
 mod constrained;
+mod frozen;
 mod pairs;
 mod part;
 mod report;
@@ -31,6 +32,7 @@ use crate::free_nodes::LOOSE_RADIUS;
 use clock::StageClock;
 use constrained::Constrained;
 pub use constrained::{BubbleData, FreeSettings, MOST_FREE};
+pub use frozen::{FrozenProblem, Prediction};
 pub use part::ContactPart;
 use part::Deformed;
 pub use report::{ActiveContact, N_STAGES, Stage, StepReport};
@@ -97,6 +99,8 @@ pub struct Engine {
     deviation: [f64; 6],
     /// On the tool, from the contacts, at the end of the last step.
     last_wrench: [f64; 6],
+    /// m, point of the tool's rows in the last pass.
+    reference: DVec3,
     /// The p-method by Galerkin, where the scene asks for it.
     constrained: Option<Box<Constrained>>,
 }
@@ -135,6 +139,7 @@ impl Engine {
             last_target: None,
             deviation: [0.0; 6],
             last_wrench: [0.0; 6],
+            reference: DVec3::ZERO,
             constrained: None,
             part,
             tool,
@@ -188,9 +193,20 @@ impl Engine {
         self.coupling.as_ref()
     }
 
+    /// Whether interface nodes of the part are constrained (p-method by Galerkin).
+    pub fn is_constrained(&self) -> bool {
+        self.constrained.is_some()
+    }
+
     /// The rigid tool.
     pub fn tool(&self) -> &Tool {
         &self.tool
+    }
+
+    /// m, how far a point of the tool that is near the part goes between two poses.
+    pub fn motion(&self, from: &DPose3, to: &DPose3) -> f64 {
+        (to.translation - from.translation).length()
+            + self.reach_of_rotation * from.rotation.angle_between(to.rotation)
     }
 
     /// Forgets all contact: undeformed part, tool at its next target.
@@ -255,8 +271,7 @@ impl Engine {
         }
         self.switch_free_nodes(&mut report);
         let from = self.last_target.unwrap_or(*target);
-        let motion = (target.translation - from.translation).length()
-            + self.reach_of_rotation * from.rotation.angle_between(target.rotation);
+        let motion = self.motion(&from, target);
         let n_strides = (motion / self.settings.max_stride)
             .ceil()
             .clamp(1.0, MAX_STRIDES);
@@ -319,6 +334,7 @@ impl Engine {
     fn pass(&mut self, tool_pose: &mut DPose3, target: &DPose3, report: &mut StepReport) -> f64 {
         let mut clock = StageClock::start();
         let reference = tool_pose.translation;
+        self.reference = reference;
         let part = self.part.as_ref();
         let tool = &self.tool;
         let pose = *tool_pose;

@@ -342,6 +342,8 @@ pub struct Accuracy {
     pub lcp_rounds: Option<usize>,
     /// Planes kept in one step, the deepest first.
     pub max_contacts: usize,
+    /// Whether the haptic loop solves whole steps.
+    pub rates: Rates,
     /// Number type of the displacement multiply.
     pub scalar: Scalar,
     /// Where the displacement multiply runs.
@@ -360,6 +362,7 @@ impl Accuracy {
             lcp_tolerance: raw::default::LCP_TOLERANCE,
             lcp_rounds: None,
             max_contacts: raw::default::MAX_CONTACTS as usize,
+            rates: Rates::Auto,
             scalar: Scalar::F64,
             multiply: Multiply::Auto,
         };
@@ -400,8 +403,12 @@ impl Accuracy {
             Scalar::F32 => "f32",
         };
         let preset = self.preset.map(|p| format!("{}: ", p.name()));
+        let rates = match self.rates {
+            Rates::Auto | Rates::One => String::new(),
+            Rates::Every(n) => format!(", results {n} periods later"),
+        };
         format!(
-            "{}{planes}, interface nodes {}, LCP to {:e}, shape in {scalar}",
+            "{}{planes}, interface nodes {}, LCP to {:e}, shape in {scalar}{rates}",
             preset.unwrap_or_default(),
             self.adaptive.words(),
             self.lcp_tolerance
@@ -426,6 +433,19 @@ impl Adaptive {
             PMethod::Constrain => format!("{which} (constrain)"),
         }
     }
+}
+
+/// Whether the haptic loop solves whole steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Rates {
+    /// Yes; in real time only if they fit the period, by measurement.
+    #[default]
+    Auto,
+    /// Yes.
+    One,
+    /// No: the engine runs beside it, and its results are there so many servo periods later, in
+    /// [1, 50]; in real time as soon as they are solved.
+    Every(u32),
 }
 
 /// Bend of an edge, as a share of the largest displacement, that a picture of a thousand pixels

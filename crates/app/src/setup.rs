@@ -17,6 +17,7 @@ use crate::machine::Machine;
 use crate::prepare::budget::bytes;
 use crate::prepare::{BubbleReach, GroupRef, PartSpec, PreparedPart};
 use crate::scene::{self, Adaptive, FreeNodes, PMethod, QuadratureRule, Scene, ToolShape};
+use crate::session::rates::Rates;
 use crate::session::{Holds, SessionSpec, part_extent};
 
 /// The part of a scene.
@@ -277,5 +278,10 @@ pub fn session(scene: &Scene) -> SessionSpec {
         },
         period_s: scene.device.servo_period,
         real_time: scene.device.real_time,
+        rates: match scene.accuracy.rates {
+            scene::Rates::Auto => Rates::Auto,
+            scene::Rates::One => Rates::One,
+            scene::Rates::Every(n) => Rates::Every(n),
+        },
     }
 }

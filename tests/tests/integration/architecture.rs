@@ -59,7 +59,11 @@ fn nothing_the_step_calls_can_lock() {
         root().join("crates/app/src/engine"),
         root().join("crates/contact/src"),
     ];
-    let mut files = vec![root().join("crates/app/src/engine.rs")];
+    // Of the session, what the loop calls where the engine runs beside it.
+    let mut files: Vec<_> = ["engine", "session/fast", "session/handover", "session/slew"]
+        .iter()
+        .map(|file| root().join(format!("crates/app/src/{file}.rs")))
+        .collect();
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
@@ -73,9 +77,11 @@ fn nothing_the_step_calls_can_lock() {
     }
     for path in files {
         let text = std::fs::read_to_string(&path).unwrap();
+        // Tests may share what they build.
+        let called = text.split("#[cfg(test)]").next().unwrap_or_default();
         n_files += 1;
         for waits in WAITS {
-            assert!(!text.contains(waits), "{}: {waits}", path.display());
+            assert!(!called.contains(waits), "{}: {waits}", path.display());
         }
     }
     assert!(n_files > 20, "{n_files} files only");

@@ -9,4 +9,5 @@ mod docs;
 mod fast_path;
 mod p_method;
 mod scenes;
+mod two_rates;
 mod verify;

@@ -103,6 +103,21 @@ impl Watch {
         &self.watched
     }
 
+    /// Candidates that may be nearer than `distance` (m, at least the reach), by the appointments of the last look.
+    pub(super) fn within(&self, distance: f64) -> impl Iterator<Item = u32> {
+        let (reach, slack) = (self.reach, self.slack);
+        (0..self.is_watched.len()).filter_map(move |i| {
+            let at_least = if self.is_watched[i] {
+                self.due_at[i] - self.moved + reach
+            } else {
+                f64::from_bits(self.far_until[i]) - self.moved + reach + slack
+            };
+            // Also what is not a number.
+            let is_beyond = at_least >= distance;
+            (!is_beyond).then_some(i as u32)
+        })
+    }
+
     /// Makes the next [`Self::look`] begin anew.
     pub(super) fn forget(&mut self) {
         self.pose_then = None;

@@ -476,6 +476,24 @@ fn refusals_name_line_key_and_mend() {
             "clip.toml:22: unknown key `raduis`; the nearest is `radius`",
         ),
         (
+            adding("[accuracy]\nrates = \"two\"\n"),
+            "clip.toml:22: rates has no choice `two`; the nearest is `auto`, all are `auto`, `one`",
+        ),
+        (
+            adding("[accuracy]\nrates = { every = 0 }\n"),
+            "clip.toml:22: rates.every 0 is out of range; write 1 to 50",
+        ),
+        (
+            adding("[accuracy]\nrates = { every = 30 }\n[device]\nservo_period = 2e-3\n"),
+            "clip.toml:22: rates.every 30 periods of 0.002 s are 0.06 s, more than 0.05 s; write 25 or less",
+        ),
+        (
+            adding(
+                "[accuracy]\nadaptive = { method = \"constrain\", radius = 1.0 }\nrates = { every = 2 }\n",
+            ),
+            "clip.toml:23: rates.every does not go with adaptive method \"constrain\"; leave one of the two out, or write method = \"select\"",
+        ),
+        (
             adding("[accuracy]\nmultiply = \"gpu\"\n"),
             "clip.toml:22: multiply \"gpu\" is not in this version; use \"auto\" or \"cpu\"",
         ),

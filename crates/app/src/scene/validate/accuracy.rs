@@ -2,16 +2,18 @@
 
 use super::super::raw::{
     AccuracyKeys, AdaptiveKeys, AdaptiveRaw, At, IterationsRaw, MethodRaw, MultiplyRaw, PresetRaw,
-    ScalarRaw, default,
+    RatesRaw, ScalarRaw, default,
 };
 use super::super::units::Quantity;
 use super::super::{
-    Accuracy, Adaptive, ContactIterations, FreeNodes, Multiply, PMethod, Preset, Scalar, SceneError,
+    Accuracy, Adaptive, ContactIterations, FreeNodes, Multiply, PMethod, Preset, Rates, Scalar,
+    SceneError,
 };
 use super::{Check, Range};
 
 impl Check<'_> {
-    pub(super) fn accuracy(&self, raw: &AccuracyKeys) -> Result<Accuracy, SceneError> {
+    /// `period`: of the servo, s.
+    pub(super) fn accuracy(&self, raw: &AccuracyKeys, period: f64) -> Result<Accuracy, SceneError> {
         self.refuse_mixed_budget(raw)?;
         if let Some(at) = raw
             .multiply
@@ -35,16 +37,21 @@ impl Check<'_> {
         let max_contacts = most.map_or(Ok(default::MAX_CONTACTS), |at| {
             self.integer("max_contacts", at, 1, 5000)
         })?;
+        let adaptive = match &raw.adaptive {
+            Some(at) => self.adaptive(at)?,
+            None => base.adaptive,
+        };
         Ok(Accuracy {
             preset,
             budget_us: match &raw.budget_us {
                 Some(at) => Some(self.micros("budget_us", at)?),
                 None => None,
             },
-            adaptive: match &raw.adaptive {
-                Some(at) => self.adaptive(at)?,
-                None => base.adaptive,
+            rates: match &raw.rates {
+                Some(at) => self.rates(at, adaptive, period)?,
+                None => base.rates,
             },
+            adaptive,
             contact_iterations: match &raw.contact_iterations {
                 Some(at) => self.iterations(at)?,
                 None => base.contact_iterations,
@@ -113,6 +120,40 @@ impl Check<'_> {
             )),
             None => Ok(()),
         }
+    }
+
+    fn rates(
+        &self,
+        at: &At<RatesRaw>,
+        adaptive: Adaptive,
+        period: f64,
+    ) -> Result<Rates, SceneError> {
+        /// s, after which a result is too old: twice as old, before the next, it would begin to fade.
+        const MOST_DELAY: f64 = 0.05;
+        let every = match &at.value {
+            RatesRaw::Auto => return Ok(Rates::Auto),
+            RatesRaw::One => return Ok(Rates::One),
+            RatesRaw::Every(every) => every,
+        };
+        let periods = self.integer("rates.every", every, 1, 50)? as u32;
+        let most = (MOST_DELAY / period * (1.0 + 1e-9)).floor().max(1.0);
+        if f64::from(periods) > most {
+            let what = format!(
+                "rates.every {periods} periods of {period} s are {} s, more than {MOST_DELAY} s",
+                f64::from(periods) * period
+            );
+            return Err(self.error(every.offset, what, format!("write {most} or less")));
+        }
+        if let Adaptive::On {
+            method: PMethod::Constrain,
+            ..
+        } = adaptive
+        {
+            let what = "rates.every does not go with adaptive method \"constrain\"".to_owned();
+            let mend = "leave one of the two out, or write method = \"select\"";
+            return Err(self.error(at.offset, what, mend));
+        }
+        Ok(Rates::Every(periods))
     }
 
     fn micros(&self, key: &str, at: &At<f64>) -> Result<f64, SceneError> {

@@ -3,14 +3,14 @@
 //!
 //! The rows are those of the step's last pass, and the nodes that may come near before the next step ends. The
 //! operator is kept, and so is its factor: a solve changes it by the rows that come and go, in some m² operations.
-//! What changes is the gaps. Up to [`MOST_RENEWED`] they are measured anew, at the places where the last answer has
-//! the nodes and the tool:
+//! What changes is the gaps. They are measured anew, at the places where the last answer has the nodes and the tool:
 //!
 //! ```text
 //! w = g(ξ, u) + W (z - z_last)      u = C f_last      W = H_d C H_dᵀ + H_t K_c⁻¹ H_tᵀ, kept
 //! ```
 //!
-//! so that where solves stand still, they stand at the solution of a whole step (a modified Newton's method). For more rows the planes themselves are kept and move with the target:
+//! so that where solves stand still, they stand at the solution of a whole step (a modified Newton's method). Where
+//! that reads too much of C for a tick, the planes themselves are kept, and move with the target:
 //!
 //! ```text
 //! w = q₀ - H_t (ξ* - ξ*₀) + W z
@@ -31,12 +31,12 @@ use glamx::DPose3;
 use super::part::Deformed;
 use super::{ActiveContact, Engine, StepReport, state_of};
 
-/// Rows of nodes that are not near yet: as many as there are near ones, so that W costs four times that of a pass
-/// at most, and no fewer than this.
-const FEWEST_EXTRA: usize = 64;
+/// Rows of nodes that are not near yet: half as many as there are near ones, so that W costs twice that of a pass at
+/// most, and no fewer than this.
+const FEWEST_EXTRA: usize = 32;
 
-/// Rows times contacts up to which a tick measures its gaps anew: as many blocks of C are read, in some 0.1 ms.
-const MOST_RENEWED: usize = 40_000;
+/// Blocks of C that a tick reads to measure its gaps, at most: some 0.3 ms. As many passes are made as that allows.
+const MOST_BLOCKS: usize = 160_000;
 
 /// Passes in a tick whose gaps are measured, at most; and the change of the wrench, relative, from which on no further
 /// one is made. Each pass leaves a tenth to a third of the change before it.
@@ -56,8 +56,8 @@ pub struct FrozenProblem {
     /// m, that part and tool may move before a node without a row can touch.
     margin: f64,
     tool: Tool,
-    /// Whether ticks measure gaps anew.
-    is_renewed: bool,
+    /// Passes of a tick at most; with none the planes are kept.
+    most_passes: u32,
     /// As frozen, or as the last answer has them.
     planes: Vec<Plane>,
     /// m, by row, of the node at rest.
@@ -124,12 +124,12 @@ impl FrozenProblem {
 
     /// Whether gaps are measured anew in every solve, or the planes kept.
     pub fn is_renewed(&self) -> bool {
-        self.is_renewed
+        self.most_passes > 0
     }
 
     /// Keeps the planes of the step in the solves that follow, whatever their number.
     pub fn keep_planes(&mut self) {
-        self.is_renewed = false;
+        self.most_passes = 0;
     }
 
     /// Equilibrium for a target (part's frame), from the answer before.
@@ -144,7 +144,7 @@ impl FrozenProblem {
             let is_within = false;
             return Prediction { report, is_within };
         }
-        if self.is_renewed {
+        if self.most_passes > 0 {
             self.solve_renewed(target)
         } else {
             self.move_gaps(target);
@@ -167,7 +167,7 @@ impl FrozenProblem {
                 .fold((0.0, 0.0), |sum: (f64, f64), (d, w)| {
                     (sum.0 + d * d, sum.1 + w * w)
                 });
-            if pass == MOST_PASSES || change <= LEAST_CHANGE * LEAST_CHANGE * size {
+            if pass == self.most_passes || change <= LEAST_CHANGE * LEAST_CHANGE * size {
                 answer.report.passes = pass;
                 answer.report.pivots = pivots;
                 return answer;
@@ -327,7 +327,7 @@ impl Engine {
             reach_of_rotation: self.reach_of_rotation,
             margin: 0.0,
             tool: self.tool.clone(),
-            is_renewed: false,
+            most_passes: 0,
             planes: Vec::with_capacity(rows),
             rest: Vec::with_capacity(rows),
             blocks: vec![0.0; 9 * rows * rows],
@@ -376,8 +376,9 @@ impl Engine {
         for (frozen, (plane, force)) in problem.forces_frozen.iter_mut().zip(of_rows) {
             *frozen = *force * plane.normal;
         }
-        problem.is_renewed = m * problem.active.len().max(m / 4) <= MOST_RENEWED;
-        if problem.is_renewed {
+        let per_pass = (m * problem.active.len().max(m / 8)).max(1);
+        problem.most_passes = ((MOST_BLOCKS / per_pass) as u32).min(MOST_PASSES);
+        if problem.most_passes > 0 {
             self.copy_blocks(problem);
         }
     }
@@ -428,7 +429,7 @@ impl Engine {
         );
         extra.sort_unstable_by(|a, b| a.gap.total_cmp(&b.gap));
         let room = self.scratch.max_rows() - planes.len();
-        let most = room.min(planes.len().max(FEWEST_EXTRA));
+        let most = room.min((planes.len() / 2).max(FEWEST_EXTRA));
         let margin = extra.get(most).map_or(reach, |left_out| left_out.gap);
         planes.extend(extra.iter().take(most));
         problem.margin = if report.dropped > 0 || seen.n_invalid > 0 {

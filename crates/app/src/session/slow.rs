@@ -12,8 +12,8 @@ use super::handover::{EngineEnd, Handed};
 use crate::engine::{Engine, StepReport};
 
 /// Of the way of the tool since the step before, from how far around nodes get a row: a problem is used until twice as
-/// many periods have gone by, and a hand becomes faster.
-const REACH_SHARE: f64 = 3.0;
+/// many periods have gone by.
+const REACH_SHARE: f64 = 2.0;
 
 /// Of the distance at which nodes get a plane, the same at rest.
 const REACH_AT_REST: f64 = 3.0;

@@ -1,10 +1,13 @@
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use contact::lcp;
 use contact::tool::{Sphere, Tool};
 use device::VirtualCoupling;
 
+use super::fast::FastLoop;
+use super::handover::Handed;
+use super::slow::solve_and_freeze;
 use super::*;
 use crate::engine::{ContactIterations, ContactPart, EngineSettings};
 

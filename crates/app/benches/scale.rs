@@ -4,7 +4,8 @@
 //! all touch (displacements by Boussinesq and Cerruti, see Johnson, Contact Mechanics, 3.2 and 3.6), then slid over
 //! it in steps of 20 um with a slow bob, its pose imposed. Only steps with contact count.
 //! `cargo bench -p snapin --bench scale` runs it on one core (a minute) and prints the tables;
-//! with `SNAPIN_WRITE_DOCS=1` it writes them into `docs/performance.md`.
+//! with `SNAPIN_WRITE_DOCS=1` it writes them into `docs/performance.md`. `-- size`, `-- contacts` or `-- triangles`
+//! prints that table alone.
 
 #![allow(
     clippy::unwrap_used,
@@ -88,6 +89,7 @@ fn measure(part: &Arc<ContactPart>, tool: Tool, radius: f64, contacts: f64) -> M
         displacement_tolerance: 1e-9,
         near_distance: 0.0004 * 2.0 * radius,
         max_contacts: 1024,
+        merge_tolerance: 0.0,
         lcp: contact::lcp::Settings::default(),
         max_stride: 0.02 * 2.0 * radius,
     };
@@ -196,21 +198,32 @@ fn main() {
     )
     .unwrap();
     text += &header("nodes that can touch");
-    let mut part = half_space(15);
-    for side in [15, 26, 40, 55] {
-        part = half_space(side);
+    let asked: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|a| !a.starts_with('-'))
+        .collect();
+    let is_asked = |table: &str| asked.is_empty() || asked.iter().any(|a| a == table);
+    let sides: &[usize] = if is_asked("size") {
+        &[15, 26, 40, 55]
+    } else {
+        &[]
+    };
+    for &side in sides {
+        let part = half_space(side);
         text += &row(
             (side * side).to_string(),
             &measure(&part, sphere(0.03), 0.03, 62.0),
         );
     }
+    let part = half_space(55);
     writeln!(
         text,
         "\nContacts, on 3025 nodes, sphere of 30 mm (100 mm from 250 on):\n"
     )
     .unwrap();
     text += &header("aim");
-    for contacts in [5.0, 15.0, 30.0, 62.0, 120.0, 250.0, 500.0] {
+    let aims = [5.0, 15.0, 30.0, 62.0, 120.0, 250.0, 500.0];
+    for contacts in aims.into_iter().filter(|_| is_asked("contacts")) {
         let radius = if contacts < 200.0 { 0.03 } else { 0.1 };
         text += &row(
             format!("{contacts}"),
@@ -223,7 +236,10 @@ fn main() {
     )
     .unwrap();
     text += &header("triangles");
-    for rings in [8, 24, 72, 224] {
+    for rings in [8, 24, 72, 224]
+        .into_iter()
+        .filter(|_| is_asked("triangles"))
+    {
         let (vertices, triangles) = sphere_mesh(0.03, rings);
         let n = triangles.len();
         let tool = Tool::Mesh(Mesh::new(&vertices, &triangles).unwrap().into());
@@ -236,7 +252,7 @@ fn main() {
         }
     }
     println!("{text}");
-    if std::env::var_os("SNAPIN_WRITE_DOCS").is_some() {
+    if std::env::var_os("SNAPIN_WRITE_DOCS").is_some() && asked.is_empty() {
         let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/performance.md");
         let old = std::fs::read_to_string(&page).unwrap();
         let (begin, end) = ("<!-- step: begin -->\n", "<!-- step: end -->");

@@ -8,9 +8,11 @@
 //! Everything here is in the part's frame; the session converts from and to the world.
 
 mod clock;
+mod clusters;
 mod constrained;
 mod pairs;
 mod part;
+mod prune;
 mod report;
 mod scratch;
 mod switch;
@@ -18,9 +20,10 @@ mod watch;
 
 use std::sync::Arc;
 
-use contact::delassus::{CouplingCompliance, delassus_into};
+use contact::delassus::{ComplianceBlocks, CouplingCompliance, delassus_into};
 use contact::lcp;
-use contact::plane::{planes_and_rest_into, planes_into, wrench_on_tool};
+use contact::patch::Patches;
+use contact::plane::{Plane, planes_and_rest_into, planes_into, wrench_on_tool};
 use contact::tool::Tool;
 use device::VirtualCoupling;
 use glam::DVec3;
@@ -59,14 +62,22 @@ pub struct EngineSettings {
     /// m. Nodes nearer to the tool than this get a plane. Does not change a converged result:
     /// a node that comes in from farther away gets its plane in the next pass.
     pub near_distance: f64,
-    /// Rows of the LCP that memory is reserved for; beyond it the deepest gaps are kept.
+    /// Rows of the LCP. More near nodes than that share rows in patches, up to [`NEAR_PER_ROW`] times as many; beyond
+    /// it the deepest gaps are kept. A solution takes a time that grows with the cube of the rows, W with the square of
+    /// the near nodes.
     pub max_contacts: usize,
+    /// Of the resultant's relative error where rows are shared, as [`StepReport::merge_error`] estimates it: above it
+    /// a step says so. Human fingers resolve 7 % of a force at best.
+    pub merge_tolerance: f64,
     /// Settings of the LCP solver.
     pub lcp: lcp::Settings,
     /// m. Tool motion in one go; a faster handle is followed in several strides of the same step,
     /// so that a jump cannot pick another branch or pass through the part unseen.
     pub max_stride: f64,
 }
+
+/// Near nodes that memory is reserved for, in rows of the LCP.
+pub const NEAR_PER_ROW: usize = 8;
 
 /// Passes after which [`ContactIterations::Converged`] gives up and says so in the report.
 /// Nearby states need 3 to 7; more than 60 means that two sets of planes alternate.
@@ -115,8 +126,21 @@ impl Engine {
         coupling: Option<VirtualCoupling>,
         settings: EngineSettings,
     ) -> Result<Self, contact::Error> {
+        Self::with_room(part, tool, coupling, settings, usize::MAX)
+    }
+
+    /// As [`Engine::new`], for at most `max_near` near nodes, or as many as there are rows.
+    fn with_room(
+        part: Arc<ContactPart>,
+        tool: Tool,
+        coupling: Option<VirtualCoupling>,
+        settings: EngineSettings,
+        max_near: usize,
+    ) -> Result<Self, contact::Error> {
         let max_contacts = settings.max_contacts.min(part.n_candidates()).max(1);
-        let scratch = Scratch::new(part.n_candidates(), max_contacts);
+        let max_near = NEAR_PER_ROW.saturating_mul(max_contacts).min(max_near);
+        let max_near = max_near.min(part.n_candidates()).max(max_contacts);
+        let scratch = Scratch::new(part.n_candidates(), max_near, max_contacts);
         Ok(Self {
             reach_of_rotation: reach_of_rotation(&tool, &part),
             coupling_compliance: coupling.as_ref().map(VirtualCoupling::compliance),
@@ -157,10 +181,10 @@ impl Engine {
         settings: EngineSettings,
     ) -> Result<Self, contact::Error> {
         let part = Arc::new(part.bounded_by(&bubbles.bounds));
-        let mut engine = Self::new(part, tool, coupling, settings)?;
+        let mut engine = Self::with_room(part, tool, coupling, settings, constrained::MOST_KNOWN)?;
         let n_candidates = engine.part.n_candidates();
-        let max_rows = engine.scratch.max_rows();
-        let constrained = Constrained::new(bubbles, free, n_candidates, max_rows);
+        let max_near = engine.scratch.max_near();
+        let constrained = Constrained::new(bubbles, free, n_candidates, max_near);
         engine.constrained = Some(Box::new(constrained));
         // Its own operator keeps its own blocks.
         engine.scratch.pairs = pairs::Pairs::new(n_candidates, 0);
@@ -324,21 +348,15 @@ impl Engine {
         let pose = *tool_pose;
         let near_distance = self.settings.near_distance;
 
-        // Which candidates can be near: a list that stays valid over many passes and steps.
-        if let Some(constrained) = &mut self.constrained {
-            let active = &self.scratch.active;
-            let state = state_of(part, tool, tool_pose, &self.scratch, Some(constrained));
-            if self.watch.is_far_due(state) {
-                constrained.make_terms(active);
-            }
+        // Which candidates can be near.
+        let constrained = self.constrained.as_deref();
+        let state = state_of(part, tool, tool_pose, &self.scratch, constrained);
+        let asks = self.watch.advance(state);
+        if let (true, Some(constrained)) = (asks, &mut self.constrained) {
+            constrained.make_terms(&self.scratch.active);
         }
-        let state = state_of(
-            part,
-            tool,
-            tool_pose,
-            &self.scratch,
-            self.constrained.as_deref(),
-        );
+        let constrained = self.constrained.as_deref();
+        let state = state_of(part, tool, tool_pose, &self.scratch, constrained);
         self.watch.look(state);
         let candidates = self.watch.take_due();
         if let Some(constrained) = &mut self.constrained {
@@ -377,7 +395,7 @@ impl Engine {
             position_of,
             near_distance,
             planes,
-            |candidate, distance| watch.postpone(candidate, distance),
+            |candidate, distance, at| watch.postpone(part.clusters(), candidate, distance, at),
         );
         watch.give_back(candidates);
         report.dropped = (left_out.n_beyond_capacity + left_out.n_invalid) as u32;
@@ -405,15 +423,17 @@ impl Engine {
             planes_into(tool, &pose, missing, position_of, f64::INFINITY, extra);
         }
         self.scratch.keep_seen();
+        let m = self.scratch.gather(part.clusters(), self.reach_of_rotation);
         let Scratch {
             planes,
             u_before,
+            prune,
             w_matrix,
             q,
             pairs,
             ..
         } = &mut self.scratch;
-        report.near = planes.len() as u32;
+        (report.near, report.rows) = (planes.len() as u32, m as u32);
         u_before.clear();
         u_before.extend(
             planes
@@ -423,7 +443,6 @@ impl Engine {
         clock.lap(Stage::Planes, report);
 
         // q: the gap that remains at zero contact force.
-        let m = planes.len();
         for ((q, plane), u) in q.iter_mut().zip(planes.iter()).zip(u_before.iter()) {
             let along: f64 = plane
                 .tool_row(reference)
@@ -432,6 +451,9 @@ impl Engine {
                 .map(|(h, e)| h * e)
                 .sum();
             *q = plane.gap - plane.normal.dot(*u) + along;
+        }
+        if prune.patches().is_some() {
+            prune.reduce(planes.len(), q);
         }
         // W: compliance of part and coupling seen along the contact normals. Not needed where all
         // gaps are open without force: then z = 0 is the exact answer.
@@ -442,18 +464,16 @@ impl Engine {
                 .as_ref()
                 .map(|matrix| CouplingCompliance { matrix, reference });
             let w = &mut w_matrix[..m * m];
+            let patches = prune.patches();
+            let candidates = planes.iter().map(|plane| plane.candidate);
             let assembled = match &mut self.constrained {
-                None => {
-                    if pairs.ensure(planes.iter().map(|plane| plane.candidate), part) {
-                        delassus_into(&*pairs, planes, coupling, w)
-                    } else {
-                        delassus_into(part, planes, coupling, w)
-                    }
+                None if pairs.ensure(candidates.clone(), part) => {
+                    assemble(&*pairs, planes, patches, coupling, w)
                 }
+                None => assemble(part, planes, patches, coupling, w),
                 Some(constrained) => {
-                    let candidates = planes.iter().map(|plane| plane.candidate);
                     constrained.ensure(candidates, &[], part);
-                    delassus_into(constrained.blocks(), planes, coupling, w)
+                    assemble(constrained.blocks(), planes, patches, coupling, w)
                 }
             };
             debug_assert!(assembled.is_ok(), "the matrix has the size of the planes");
@@ -469,11 +489,11 @@ impl Engine {
         clock.lap(Stage::Lcp, report);
 
         // Forces of the near nodes become the state; the tool goes where its coupling balances.
-        self.scratch.adopt_forces(m);
+        self.scratch.adopt_forces();
         if let Some(constrained) = &mut self.constrained {
             constrained.forget_terms();
         }
-        let (force, torque) = wrench_on_tool(&self.scratch.planes, &self.scratch.z[..m], reference);
+        let (force, torque) = wrench_on_tool(&self.scratch.planes, &self.scratch.z, reference);
         report.contact_wrench_on_tool = [force.x, force.y, force.z, torque.x, torque.y, torque.z];
         if let Some(compliance) = &self.coupling_compliance {
             self.deviation = compliance.map(|row| {
@@ -509,8 +529,53 @@ impl Engine {
             }
             change = change.max((u - *before).length());
         }
+        (report.merge_error, report.merged_penetration) = (0.0, 0.0);
+        report.merged_badly = false;
+        if self.scratch.prune.patches().is_some() {
+            self.weigh_patches(reference, report);
+        }
         clock.lap(Stage::Update, report);
         change
+    }
+
+    /// What the rows that nodes share have cost, and better shares for the next time.
+    fn weigh_patches(&mut self, reference: DVec3, report: &mut StepReport) {
+        let stride = self.scratch.stride();
+        let Scratch {
+            planes,
+            prune,
+            active,
+            known,
+            pairs,
+            z,
+            ..
+        } = &mut self.scratch;
+        let (part, constrained) = (self.part.as_ref(), self.constrained.as_deref());
+        let deformed = Deformed {
+            part,
+            active,
+            constrained,
+            pairs,
+        };
+        let motion_of = |plane: &Plane| {
+            let i = plane.candidate as usize;
+            let displacement = known.get(i).unwrap_or_else(|| deformed.displacement(i));
+            let row = plane.tool_row(reference);
+            let along = row.iter().zip(&self.deviation).map(|(h, e)| h * e).sum();
+            (displacement, along)
+        };
+        let own_of = |plane: &Plane| {
+            let i = plane.candidate as usize;
+            let block = match constrained {
+                None => part.block(i, i),
+                Some(constrained) => constrained.blocks().block(i, i),
+            };
+            plane.normal.dot(*block * plane.normal)
+        };
+        let loss = prune.learn(planes, z, motion_of, own_of, stride);
+        report.merged_penetration = loss.penetration;
+        report.merge_error = loss.force_rel;
+        report.merged_badly = loss.force_rel > self.settings.merge_tolerance;
     }
 
     /// Fills in both sides of the tool's equilibrium.
@@ -523,6 +588,20 @@ impl Engine {
             // An imposed pose carries whatever the contact asks for.
             None => report.contact_wrench_on_tool.map(|x| -x),
         };
+    }
+}
+
+/// W of the planes, or of the patches they are gathered in.
+fn assemble(
+    compliance: &impl ComplianceBlocks,
+    planes: &[Plane],
+    patches: Option<&Patches>,
+    coupling: Option<CouplingCompliance>,
+    w: &mut [f64],
+) -> Result<(), contact::Error> {
+    match patches {
+        None => delassus_into(compliance, planes, coupling, w),
+        Some(patches) => patches.delassus_into(compliance, planes, coupling, w),
     }
 }
 

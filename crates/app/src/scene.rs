@@ -340,8 +340,10 @@ pub struct Accuracy {
     pub lcp_tolerance: f64,
     /// Rounds of pivoting in one contact problem; `None`: as many as it takes.
     pub lcp_rounds: Option<usize>,
-    /// Planes kept in one step, the deepest first.
+    /// Rows of one contact problem; more near nodes than that share rows.
     pub max_contacts: usize,
+    /// Relative error of the resultant by sharing rows above which a step is counted and reported, > 0.
+    pub merge_tolerance: f64,
     /// Number type of the displacement multiply.
     pub scalar: Scalar,
     /// Where the displacement multiply runs.
@@ -360,6 +362,7 @@ impl Accuracy {
             lcp_tolerance: raw::default::LCP_TOLERANCE,
             lcp_rounds: None,
             max_contacts: raw::default::MAX_CONTACTS as usize,
+            merge_tolerance: raw::default::MERGE_TOLERANCE,
             scalar: Scalar::F64,
             multiply: Multiply::Auto,
         };

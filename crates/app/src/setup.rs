@@ -187,6 +187,7 @@ pub fn engine(scene: &Scene, prepared: &PreparedPart, tool: Tool) -> Result<Engi
         displacement_tolerance: DISPLACEMENT_TOLERANCE,
         near_distance: scene.accuracy.near_distance.unwrap_or(NEAR_SHARE * size),
         max_contacts: scene.accuracy.max_contacts,
+        merge_tolerance: scene.accuracy.merge_tolerance,
         lcp: lcp_settings(scene),
         max_stride: STRIDE_SHARE * size,
     };

@@ -58,6 +58,7 @@ pub mod delassus;
 mod error;
 pub mod friction;
 pub mod lcp;
+pub mod patch;
 pub mod plane;
 pub mod proximity;
 pub mod tool;

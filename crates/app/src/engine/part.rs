@@ -5,6 +5,7 @@ use contact::delassus::ComplianceBlocks;
 use glam::{DMat3, DVec3};
 
 use super::ActiveContact;
+use super::clusters::Clusters;
 use super::constrained::Constrained;
 use super::pairs::Pairs;
 
@@ -16,8 +17,7 @@ pub struct ContactPart {
     blocks: Vec<f64>,
     /// m/N, by candidate j: bound on the norm of C_ij for all candidates i.
     largest_block: Vec<f64>,
-    /// The same for all i but j itself.
-    largest_other: Vec<f64>,
+    clusters: Clusters,
 }
 
 impl ContactPart {
@@ -34,20 +34,21 @@ impl ContactPart {
             "compliance blocks do not fit the candidates"
         );
         assert!(n_rows >= rest.len(), "the candidates are the first rows");
-        let (largest_other, largest_block) = (0..rest.len())
+        let column = |j: usize| &cast_slice::<f64, DMat3>(&blocks)[j * n_rows..][..rest.len()];
+        let largest_block = (0..rest.len())
             .map(|j| {
-                let column = &cast_slice::<f64, DMat3>(&blocks)[j * n_rows..][..rest.len()];
-                let largest = |part: &[DMat3]| part.iter().map(norm_squared).fold(0.0, f64::max);
-                let other = largest(&column[..j]).max(largest(&column[j + 1..]));
-                (other.sqrt(), other.max(norm_squared(&column[j])).sqrt())
+                let squared = column(j).iter().map(norm_squared);
+                squared.fold(0.0, f64::max).sqrt()
             })
-            .unzip();
+            .collect();
+        let mut clusters = Clusters::new(&rest);
+        clusters.add_all(|i, j| column(j)[i]);
         Self {
             rest,
             n_rows,
             blocks,
             largest_block,
-            largest_other,
+            clusters,
         }
     }
 
@@ -60,7 +61,7 @@ impl ContactPart {
             "one bound for each candidate"
         );
         self.largest_block.copy_from_slice(bounds);
-        self.largest_other.copy_from_slice(bounds);
+        self.clusters.bound_by(bounds);
         self
     }
 
@@ -97,9 +98,9 @@ impl ContactPart {
         self.largest_block[candidate as usize]
     }
 
-    /// As [`Self::largest_block`], for all candidates but this one.
-    pub(super) fn largest_other(&self, candidate: u32) -> f64 {
-        self.largest_other[candidate as usize]
+    /// The candidates in clusters of neighbours.
+    pub(super) fn clusters(&self) -> &Clusters {
+        &self.clusters
     }
 
     /// Upper bound on the displacement of any candidate, m.

@@ -71,10 +71,19 @@ pub struct StepReport {
     pub coupling_wrench_on_tool: [f64; 6],
     /// Nodes that had a plane in the last pass.
     pub near: u32,
+    /// Rows of the last contact problem: fewer than `near` where nodes share rows in patches.
+    pub rows: u32,
     /// Nodes that carry force.
     pub contacts: u32,
     /// Near nodes left out because memory for more was not reserved.
     pub dropped: u32,
+    /// Where nodes share rows: estimate of the resultant's relative error by that, of the last pass (see
+    /// [`contact::patch::Loss`]).
+    pub merge_error: f64,
+    /// m, deepest that a node penetrates its plane after the last pass because it shares a row.
+    pub merged_penetration: f64,
+    /// Whether `merge_error` is above its tolerance.
+    pub merged_badly: bool,
     /// Passes over the contact planes (of the last stride).
     pub passes: u32,
     /// Strides in which a fast handle was followed.
@@ -107,8 +116,12 @@ impl StepReport {
             contact_wrench_on_tool: [0.0; 6],
             coupling_wrench_on_tool: [0.0; 6],
             near: 0,
+            rows: 0,
             contacts: 0,
             dropped: 0,
+            merge_error: 0.0,
+            merged_penetration: 0.0,
+            merged_badly: false,
             passes: 0,
             strides: 0,
             pivots: 0,

@@ -24,7 +24,12 @@ impl Story<'_> {
             ),
             (
                 count(&|r| r.report.dropped > 0) as u64,
-                "steps with more near nodes than accuracy.max_contacts",
+                "steps with eight times more near nodes than accuracy.max_contacts, or nodes without a distance",
+            ),
+            (
+                count(&|r| r.report.merged_badly) as u64,
+                "steps with near nodes beyond accuracy.max_contacts whose shared rows may be wrong by more than \
+                 accuracy.merge_tolerance",
             ),
             (
                 count(&|r| r.report.switch_forced) as u64,

@@ -32,6 +32,7 @@ pub(super) mod default {
     pub(crate) const SERVO_PERIOD: f64 = 1e-3;
     pub(crate) const LCP_TOLERANCE: f64 = 1e-10;
     pub(crate) const MAX_CONTACTS: i64 = 500;
+    pub(crate) const MERGE_TOLERANCE: f64 = 0.05;
     pub(crate) const FRAMES: i64 = 6;
 }
 

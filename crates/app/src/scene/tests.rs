@@ -496,6 +496,10 @@ fn refusals_name_line_key_and_mend() {
             "clip.toml:22: max_contacts 100000 is out of range; write 1 to 5000",
         ),
         (
+            adding("[accuracy]\nmerge_tolerance = 5\n"),
+            "clip.toml:22: merge_tolerance 5 is more than all of the force; write a share from above 0 to 1",
+        ),
+        (
             adding("[device]\nservo_period = 1\n"),
             "clip.toml:22: servo_period 1 s is not between 1e-5 and 0.1; haptic devices take 0.001",
         ),

@@ -257,10 +257,15 @@ pub(in crate::scene) struct AccuracyKeys {
     /// this key there is no such budget: the exact answer is found.
     #[schemars(range(min = 1, max = 1000), extend("x-default" = "no budget"))]
     pub(in crate::scene) lcp_rounds: Option<At<i64>>,
-    /// Contact planes in one step, 1 to 5000; beyond it the deepest are kept and the rest is
-    /// counted and reported.
+    /// Rows of the contact problem of one step, 1 to 5000; its time grows with their cube. Where
+    /// more nodes are near, neighbours share a row, up to eight times as many; beyond that the
+    /// deepest are kept and the rest is counted and reported.
     #[schemars(range(min = 1, max = 5000), extend("default" = default::MAX_CONTACTS))]
     pub(in crate::scene) max_contacts: Option<At<i64>>,
+    /// Where nodes share rows, relative error of the resultant force above which steps are counted
+    /// and reported, above 0 to 1. It is estimated in each step by the gaps that are left.
+    #[schemars(extend("x-quantity" = "number", "default" = default::MERGE_TOLERANCE))]
+    pub(in crate::scene) merge_tolerance: Option<At<f64>>,
     /// Number type of the displacement multiply; forces are always computed in f64.
     #[schemars(extend("default" = "f64"))]
     pub(in crate::scene) scalar: Option<At<ScalarRaw>>,

@@ -59,6 +59,10 @@ impl Check<'_> {
                 None => None,
             },
             max_contacts: max_contacts as usize,
+            merge_tolerance: match &raw.merge_tolerance {
+                Some(at) => self.merge_tolerance(at)?,
+                None => base.merge_tolerance,
+            },
             scalar: match raw.scalar.as_ref().map(|at| at.value) {
                 Some(ScalarRaw::F32) => Scalar::F32,
                 Some(ScalarRaw::F64) => Scalar::F64,
@@ -136,6 +140,15 @@ impl Check<'_> {
         if !(1e-15..=1e-2).contains(&value) {
             let what = format!("lcp_tolerance {value:e} is not between 1e-15 and 1e-2");
             return Err(self.error(at.offset, what, "1e-10 is safe with 64-bit numbers"));
+        }
+        Ok(value)
+    }
+
+    fn merge_tolerance(&self, at: &At<f64>) -> Result<f64, SceneError> {
+        let value = self.number("merge_tolerance", at, Quantity::Number, Range::Positive)?;
+        if value > 1.0 {
+            let what = format!("merge_tolerance {value} is more than all of the force");
+            return Err(self.error(at.offset, what, "write a share from above 0 to 1"));
         }
         Ok(value)
     }

@@ -42,18 +42,26 @@ unsafe impl GlobalAlloc for Counting {
 static ALLOCATOR: Counting = Counting;
 
 /// Both scenes, pushed in and pulled out again, a jump of the handle and a pose that is refused; the
-/// clip also with free nodes chosen, built and blended in on the way, and its shape drawn.
+/// clip also with free nodes chosen, built and blended in on the way, and its shape drawn; and with fewer rows than
+/// nodes come near.
 #[test]
 fn no_step_of_an_insertion_allocates() {
     let on = |method, free| Adaptive::On { method, free };
-    for (name, adaptive) in [
-        ("clip.toml", Adaptive::Off),
-        ("hook.toml", Adaptive::Off),
-        ("clip.toml", on(PMethod::Select, FreeNodes::Indicator(1e-3))),
-        ("clip.toml", on(PMethod::Constrain, FreeNodes::Radius(3e-3))),
+    let bent = on(PMethod::Select, FreeNodes::Indicator(1e-3));
+    let free = on(PMethod::Constrain, FreeNodes::Radius(3e-3));
+    for (name, adaptive, rows) in [
+        ("clip.toml", Adaptive::Off, None),
+        ("hook.toml", Adaptive::Off, None),
+        ("clip.toml", bent, None),
+        ("clip.toml", free, None),
+        ("clip.toml", Adaptive::Off, Some(3)),
+        ("clip.toml", free, Some(3)),
     ] {
         let mut scene = Scene::load(&root().join("scenes").join(name)).unwrap();
         scene.accuracy.adaptive = adaptive;
+        if let Some(rows) = rows {
+            scene.accuracy.max_contacts = rows;
+        }
         let mut unseen = std::io::sink();
         let ui = Ui::new(&mut unseen, false);
         let prepared = prepare(
@@ -76,13 +84,19 @@ fn no_step_of_an_insertion_allocates() {
             .collect();
         let jump = [0.0, 0.3, 0.1, f64::NAN, 0.35];
         let before = ALLOCATIONS.load(Ordering::Relaxed);
-        let mut touched = 0;
+        let (mut touched, mut shared) = (0, 0);
         for &share in in_and_out.iter().chain(&jump) {
-            touched += u32::from(engine.step(&at(share)).contacts > 0);
+            let report = engine.step(&at(share));
+            touched += u32::from(report.contacts > 0);
+            shared += u32::from(report.rows < report.near);
             shape.update(&mut engine).unwrap();
         }
         let after = ALLOCATIONS.load(Ordering::Relaxed);
         assert!(touched > 100, "{name}: contact in {touched} steps only");
-        assert_eq!(after - before, 0, "{name} {adaptive:?}");
+        assert!(
+            (shared > 100) == rows.is_some(),
+            "{name}: rows shared in {shared} steps"
+        );
+        assert_eq!(after - before, 0, "{name} {adaptive:?} {rows:?}");
     }
 }

@@ -8,10 +8,14 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use device::Wrench;
 use glamx::DPose3;
+use snapin::engine::StepReport;
 use snapin::prepare::{PrepareOptions, prepare};
 use snapin::progress::Ui;
 use snapin::scene::{Adaptive, Columns, FreeNodes, PMethod, Scalar, Scene};
+use snapin::session::fast::FastSettings;
+use snapin::session::slow::Stepped;
 use snapin::setup;
 use snapin::shape::Shape;
 use snapin_tests::root;
@@ -41,27 +45,49 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// Both scenes, pushed in and pulled out again, a jump of the handle and a pose that is refused; the
-/// clip also with 32-bit numbers, with most of its columns missing, and with free nodes chosen, built and blended in on
-/// the way, and its shape drawn.
+/// One after the other, because all threads share the counter.
 #[test]
+fn nothing_in_the_haptic_loop_allocates() {
+    no_step_of_an_insertion_allocates();
+    no_tick_of_two_rates_allocates();
+}
+
+/// All scenes, pushed in and pulled out again, a jump of the handle and a pose that is refused; the
+/// clip also with 32-bit numbers, with most of its columns missing, and with free nodes chosen, built and blended in on
+/// the way, and its shape drawn; and with fewer rows than nodes come near.
 fn no_step_of_an_insertion_allocates() {
     let on = |method, free| Adaptive::On { method, free };
     let all = (Columns::All, Scalar::F64);
     let bent = on(PMethod::Select, FreeNodes::Indicator(1e-3));
     let constrained = on(PMethod::Constrain, FreeNodes::Radius(3e-3));
-    for (name, adaptive, (columns, contact_scalar)) in [
-        ("clip.toml", Adaptive::Off, all),
-        ("clip.toml", Adaptive::Off, (Columns::All, Scalar::F32)),
-        ("clip.toml", Adaptive::Off, (Columns::Near, Scalar::F32)),
-        ("hook.toml", Adaptive::Off, all),
-        ("clip.toml", bent, all),
-        ("clip.toml", constrained, all),
+    for (name, adaptive, (columns, contact_scalar), rows) in [
+        ("clip.toml", Adaptive::Off, all, None),
+        (
+            "clip.toml",
+            Adaptive::Off,
+            (Columns::All, Scalar::F32),
+            None,
+        ),
+        (
+            "clip.toml",
+            Adaptive::Off,
+            (Columns::Near, Scalar::F32),
+            None,
+        ),
+        ("hook.toml", Adaptive::Off, all, None),
+        ("edge.toml", Adaptive::Off, all, None),
+        ("clip.toml", bent, all, None),
+        ("clip.toml", constrained, all, None),
+        ("clip.toml", Adaptive::Off, all, Some(3)),
+        ("clip.toml", constrained, all, Some(3)),
     ] {
         let mut scene = Scene::load(&root().join("scenes").join(name)).unwrap();
         scene.accuracy.adaptive = adaptive;
         scene.accuracy.columns = columns;
         scene.accuracy.contact_scalar = contact_scalar;
+        if let Some(rows) = rows {
+            scene.accuracy.max_contacts = rows;
+        }
         let mut unseen = std::io::sink();
         let ui = Ui::new(&mut unseen, false);
         let prepared = prepare(
@@ -84,13 +110,59 @@ fn no_step_of_an_insertion_allocates() {
             .collect();
         let jump = [0.0, 0.3, 0.1, f64::NAN, 0.35];
         let before = ALLOCATIONS.load(Ordering::Relaxed);
-        let mut touched = 0;
+        let (mut touched, mut shared) = (0, 0);
         for &share in in_and_out.iter().chain(&jump) {
-            touched += u32::from(engine.step(&at(share)).contacts > 0);
+            let report = engine.step(&at(share));
+            touched += u32::from(report.contacts > 0);
+            shared += u32::from(report.rows < report.near);
             shape.update(&mut engine).unwrap();
         }
         let after = ALLOCATIONS.load(Ordering::Relaxed);
         assert!(touched > 100, "{name}: contact in {touched} steps only");
-        assert_eq!(after - before, 0, "{name} {adaptive:?} {columns:?}");
+        assert!(
+            (shared > 100) == rows.is_some(),
+            "{name}: rows shared in {shared} steps"
+        );
+        assert_eq!(
+            after - before,
+            0,
+            "{name} {adaptive:?} {columns:?} {rows:?}"
+        );
     }
+}
+
+/// The fast loop of two rates, with the engine's work in turns: solving, hand-overs and freezing take no memory.
+fn no_tick_of_two_rates_allocates() {
+    let scene = Scene::load(&root().join("scenes/clip.toml")).unwrap();
+    let mut unseen = std::io::sink();
+    let ui = Ui::new(&mut unseen, false);
+    let spec = setup::part_spec(&scene).unwrap();
+    let prepared = prepare(&spec, &PrepareOptions::default(), &ui).unwrap();
+    let (tool, _) = setup::tool(&scene).unwrap();
+    let mut engine = setup::engine(&scene, &prepared, tool).unwrap();
+    let start = scene.tool.pose_part_tool;
+    let at = |share: f64| DPose3 {
+        translation: start.translation + share * scene.hand.travel * scene.hand.direction,
+        ..start
+    };
+    let on_handle = |report: &StepReport| Wrench::from_array(&report.coupling_wrench_on_tool);
+    let settings = FastSettings {
+        period_s: 1e-3,
+        force_resolution: 0.2,
+        lever: 0.02,
+        n_ticks: 2000,
+    };
+    let mut stepped = Stepped::new(&mut engine, &start, 4, settings).unwrap();
+    let before = ALLOCATIONS.load(Ordering::Relaxed);
+    let mut touched = 0;
+    for (tick, k) in (0..=700).chain((0..=700).rev()).enumerate() {
+        let target = at(f64::from(k) / 700.0);
+        let answer = stepped.tick(tick as u64, &target, on_handle);
+        touched += u32::from(answer.report.contacts > 0);
+        stepped.work(&mut engine, tick as u64, &target);
+    }
+    let after = ALLOCATIONS.load(Ordering::Relaxed);
+    assert!(touched > 100, "contact in {touched} ticks only");
+    assert_eq!(after - before, 0);
+    assert!(stepped.fast().log().hand_overs.len() > 300);
 }

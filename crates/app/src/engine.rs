@@ -8,10 +8,16 @@
 //! Everything here is in the part's frame; the session converts from and to the world.
 
 mod clock;
+mod clusters;
 mod constrained;
+mod edges;
+mod fetched;
+mod frozen;
 mod late;
 mod pairs;
 mod part;
+mod pass;
+mod prune;
 mod report;
 mod scratch;
 mod switch;
@@ -19,10 +25,9 @@ mod watch;
 
 use std::sync::Arc;
 
-use contact::delassus::{CouplingCompliance, delassus_into};
 use contact::lcp;
-use contact::plane::{planes_and_rest_into, planes_into, wrench_on_tool};
-use contact::tool::Tool;
+use contact::surface::Surface;
+use contact::tool::{Features, Tool};
 use device::VirtualCoupling;
 use glam::DVec3;
 use glamx::DPose3;
@@ -32,6 +37,8 @@ use crate::free_nodes::LOOSE_RADIUS;
 use clock::StageClock;
 use constrained::Constrained;
 pub use constrained::{BubbleData, FreeSettings, MOST_FREE};
+use edges::Edges;
+pub use frozen::{FrozenProblem, Prediction};
 use late::Late;
 pub use part::ContactPart;
 use part::Deformed;
@@ -61,14 +68,22 @@ pub struct EngineSettings {
     /// m. Nodes nearer to the tool than this get a plane. Does not change a converged result:
     /// a node that comes in from farther away gets its plane in the next pass.
     pub near_distance: f64,
-    /// Rows of the LCP that memory is reserved for; beyond it the deepest gaps are kept.
+    /// Rows of the LCP. More near nodes than that share rows in patches, up to [`NEAR_PER_ROW`] times as many; beyond
+    /// it the deepest gaps are kept. A solution takes a time that grows with the cube of the rows, W with the square of
+    /// the near nodes.
     pub max_contacts: usize,
+    /// Of the resultant's relative error where rows are shared, as [`StepReport::merge_error`] estimates it: above it
+    /// a step says so. Human fingers resolve 7 % of a force at best.
+    pub merge_tolerance: f64,
     /// Settings of the LCP solver.
     pub lcp: lcp::Settings,
     /// m. Tool motion in one go; a faster handle is followed in several strides of the same step,
     /// so that a jump cannot pick another branch or pass through the part unseen.
     pub max_stride: f64,
 }
+
+/// Near nodes that memory is reserved for, in rows of the LCP.
+pub const NEAR_PER_ROW: usize = 8;
 
 /// Passes after which [`ContactIterations::Converged`] gives up and says so in the report.
 /// Nearby states need 3 to 7; more than 60 means that two sets of planes alternate.
@@ -99,10 +114,14 @@ pub struct Engine {
     deviation: [f64; 6],
     /// On the tool, from the contacts, at the end of the last step.
     last_wrench: [f64; 6],
+    /// m, point of the tool's rows in the last pass.
+    reference: DVec3,
     /// The p-method by Galerkin, where the scene asks for it.
     constrained: Option<Box<Constrained>>,
     /// Where columns are fetched.
     late: Option<Late>,
+    /// Corners and edges of the tool between the nodes, where it has some.
+    edges: Option<Box<Edges>>,
 }
 
 impl Engine {
@@ -119,8 +138,23 @@ impl Engine {
         coupling: Option<VirtualCoupling>,
         settings: EngineSettings,
     ) -> Result<Self, contact::Error> {
+        Self::with_room(part, tool, coupling, settings, usize::MAX)
+    }
+
+    /// As [`Engine::new`], for at most `max_near` near nodes, or as many as there are rows.
+    fn with_room(
+        part: Arc<ContactPart>,
+        tool: Tool,
+        coupling: Option<VirtualCoupling>,
+        settings: EngineSettings,
+        max_near: usize,
+    ) -> Result<Self, contact::Error> {
+        // Where columns come one by one, those that were taken in are the engine's own reckoning.
+        let part = part.view().map_or(part, Arc::new);
         let max_contacts = settings.max_contacts.min(part.n_candidates()).max(1);
-        let scratch = Scratch::new(part.n_candidates(), max_contacts);
+        let max_near = NEAR_PER_ROW.saturating_mul(max_contacts).min(max_near);
+        let max_near = max_near.min(part.n_candidates()).max(max_contacts);
+        let scratch = Scratch::new(part.n_candidates(), max_near, max_contacts);
         Ok(Self {
             reach_of_rotation: reach_of_rotation(&tool, &part),
             coupling_compliance: coupling.as_ref().map(VirtualCoupling::compliance),
@@ -139,11 +173,43 @@ impl Engine {
             last_target: None,
             deviation: [0.0; 6],
             last_wrench: [0.0; 6],
+            reference: DVec3::ZERO,
             constrained: None,
             late: part.is_fetched().then(|| Late::new(max_contacts)),
+            edges: None,
             part,
             tool,
         })
+    }
+
+    /// Has the tool's corners and edges touch the faces of the part between its nodes, too.
+    ///
+    /// The tool then moves in one go by no more than a quarter of the least height of an element behind a face.
+    ///
+    /// # Panics
+    /// If interface nodes are constrained: their faces do not follow the candidates alone (a programmer's mistake).
+    pub fn with_edges(mut self, surface: Surface, features: Features) -> Self {
+        assert!(self.constrained.is_none(), "all interface nodes are free");
+        let n_candidates = self.part.n_candidates();
+        let stride = Edges::max_stride(&surface);
+        self.settings.max_stride = self.settings.max_stride.min(stride);
+        // Nodes share no rows then: those of the edges stand beside.
+        let max_contacts = self.settings.max_contacts;
+        self.scratch = Scratch::new(n_candidates, max_contacts, max_contacts);
+        self.scratch.reserve_contacts(n_candidates);
+        let max_rows = self.scratch.max_rows();
+        let near_distance = self.settings.near_distance;
+        let clusters = self.part.clusters();
+        let edges = Edges::new(
+            surface,
+            features,
+            clusters,
+            near_distance,
+            n_candidates,
+            max_rows,
+        );
+        self.edges = Some(Box::new(edges));
+        self
     }
 
     /// An engine whose part has constrained interface nodes, some of which are freed on the way.
@@ -162,10 +228,10 @@ impl Engine {
         settings: EngineSettings,
     ) -> Result<Self, contact::Error> {
         let part = Arc::new(part.bounded_by(&bubbles.bounds));
-        let mut engine = Self::new(part, tool, coupling, settings)?;
+        let mut engine = Self::with_room(part, tool, coupling, settings, constrained::MOST_KNOWN)?;
         let n_candidates = engine.part.n_candidates();
-        let max_rows = engine.scratch.max_rows();
-        let constrained = Constrained::new(bubbles, free, n_candidates, max_rows);
+        let max_near = engine.scratch.max_near();
+        let constrained = Constrained::new(bubbles, free, n_candidates, max_near);
         engine.constrained = Some(Box::new(constrained));
         // Its own operator keeps its own blocks.
         engine.scratch.pairs = pairs::Pairs::new(n_candidates, 0);
@@ -193,9 +259,41 @@ impl Engine {
         self.coupling.as_ref()
     }
 
+    /// Whether interface nodes of the part are constrained (p-method by Galerkin).
+    pub fn is_constrained(&self) -> bool {
+        self.constrained.is_some()
+    }
+
+    /// Where the tool is after the last step, part's frame; None before the first.
+    pub fn tool_pose(&self) -> Option<DPose3> {
+        let target = self.last_target.as_ref()?;
+        Some(VirtualCoupling::pose_from_deviation(
+            target,
+            &self.deviation,
+        ))
+    }
+
+    /// Whether corners and edges of the tool touch the part between its nodes.
+    pub fn has_edges(&self) -> bool {
+        self.edges.is_some()
+    }
+
+    /// m: nodes farther from the tool than this, beyond those that get a plane, can carry none of its force.
+    pub fn reach_between_nodes(&self) -> f64 {
+        self.edges
+            .as_ref()
+            .map_or(0.0, |edges| edges.largest_face())
+    }
+
     /// The rigid tool.
     pub fn tool(&self) -> &Tool {
         &self.tool
+    }
+
+    /// m, how far a point of the tool that is near the part goes between two poses.
+    pub fn motion(&self, from: &DPose3, to: &DPose3) -> f64 {
+        (to.translation - from.translation).length()
+            + self.reach_of_rotation * from.rotation.angle_between(to.rotation)
     }
 
     /// Forgets all contact: undeformed part, tool at its next target.
@@ -210,6 +308,9 @@ impl Engine {
         }
         if let Some(late) = &mut self.late {
             late.clear();
+        }
+        if let Some(edges) = &mut self.edges {
+            edges.reset();
         }
     }
 
@@ -263,11 +364,13 @@ impl Engine {
         }
         self.switch_free_nodes(&mut report);
         if let Some(late) = &mut self.late {
+            if let Some(part) = Arc::get_mut(&mut self.part) {
+                part.take_in();
+            }
             late.begin_step(&self.part);
         }
         let from = self.last_target.unwrap_or(*target);
-        let motion = (target.translation - from.translation).length()
-            + self.reach_of_rotation * from.rotation.angle_between(target.rotation);
+        let motion = self.motion(&from, target);
         let n_strides = (motion / self.settings.max_stride)
             .ceil()
             .clamp(1.0, MAX_STRIDES);
@@ -296,6 +399,9 @@ impl Engine {
             ContactIterations::Fixed(n) => (n.max(1), 0.0),
         };
         self.scratch.begin_stride();
+        if let Some(edges) = &mut self.edges {
+            edges.begin_stride();
+        }
         report.passes = 0;
         report.converged = false;
         let mut tool_pose = VirtualCoupling::pose_from_deviation(target, &self.deviation);
@@ -321,210 +427,9 @@ impl Engine {
             report.converged = true;
         }
         report.tool_pose = tool_pose;
-        report.contacts = self.scratch.active.len() as u32;
+        let on_faces = self.edges.as_ref().map_or(0, |edges| edges.n_carried());
+        report.contacts = (self.scratch.n_own + on_faces) as u32;
         self.balance(target, report);
-    }
-
-    /// One round of proximity, planes, Delassus, LCP and update.
-    /// Returns the largest change of a near node's displacement or of the tool's pose, m.
-    fn pass(&mut self, tool_pose: &mut DPose3, target: &DPose3, report: &mut StepReport) -> f64 {
-        let mut clock = StageClock::start();
-        let reference = tool_pose.translation;
-        let part = self.part.as_ref();
-        let tool = &self.tool;
-        let pose = *tool_pose;
-        let near_distance = self.settings.near_distance;
-
-        // Which candidates can be near: a list that stays valid over many passes and steps.
-        if let Some(constrained) = &mut self.constrained {
-            let active = &self.scratch.active;
-            let state = state_of(part, tool, tool_pose, &self.scratch, Some(constrained));
-            if self.watch.is_far_due(state) {
-                constrained.make_terms(active);
-            }
-        }
-        let state = state_of(
-            part,
-            tool,
-            tool_pose,
-            &self.scratch,
-            self.constrained.as_deref(),
-        );
-        self.watch.look(state);
-        let candidates = self.watch.take_due();
-        if let Some(constrained) = &mut self.constrained {
-            let active = &self.scratch.active;
-            if !constrained.ensure(candidates.iter().copied(), active, part) {
-                constrained.make_terms(active);
-            }
-        }
-        clock.lap(Stage::Proximity, report);
-
-        // One plane per near node, at its displaced position (paper, Fig. 3).
-        let constrained = self.constrained.as_deref();
-        let Scratch {
-            planes,
-            active,
-            known,
-            pairs,
-            ..
-        } = &mut self.scratch;
-        let deformed = Deformed {
-            part,
-            active,
-            constrained,
-            pairs,
-        };
-        let position_of = |candidate: u32| {
-            let i = candidate as usize;
-            let displacement = known.get(i).unwrap_or_else(|| deformed.displacement(i));
-            part.rest_positions()[i] + displacement
-        };
-        let watch = &mut self.watch;
-        let left_out = planes_and_rest_into(
-            tool,
-            &pose,
-            &candidates,
-            position_of,
-            near_distance,
-            planes,
-            |candidate, distance| watch.postpone(candidate, distance),
-        );
-        watch.give_back(candidates);
-        report.dropped = (left_out.n_beyond_capacity + left_out.n_invalid) as u32;
-        self.scratch.find_missing();
-        let Scratch {
-            active,
-            known,
-            missing,
-            extra,
-            pairs,
-            ..
-        } = &mut self.scratch;
-        if !missing.is_empty() {
-            let deformed = Deformed {
-                part,
-                active,
-                constrained,
-                pairs,
-            };
-            let position_of = |candidate: u32| {
-                let i = candidate as usize;
-                let displacement = known.get(i).unwrap_or_else(|| deformed.displacement(i));
-                part.rest_positions()[i] + displacement
-            };
-            planes_into(tool, &pose, missing, position_of, f64::INFINITY, extra);
-        }
-        self.scratch.keep_seen();
-        if let Some(late) = &mut self.late {
-            report.without_column = late.sort_out(&mut self.scratch.planes, part) as u32;
-        }
-        let Scratch {
-            planes,
-            u_before,
-            w_matrix,
-            q,
-            pairs,
-            ..
-        } = &mut self.scratch;
-        report.near = planes.len() as u32;
-        u_before.clear();
-        u_before.extend(
-            planes
-                .iter()
-                .map(|p| p.point - part.rest_positions()[p.candidate as usize]),
-        );
-        clock.lap(Stage::Planes, report);
-
-        // q: the gap that remains at zero contact force.
-        let m = planes.len();
-        for ((q, plane), u) in q.iter_mut().zip(planes.iter()).zip(u_before.iter()) {
-            let along: f64 = plane
-                .tool_row(reference)
-                .iter()
-                .zip(&self.deviation)
-                .map(|(h, e)| h * e)
-                .sum();
-            *q = plane.gap - plane.normal.dot(*u) + along;
-        }
-        // W: compliance of part and coupling seen along the contact normals. Not needed where all
-        // gaps are open without force: then z = 0 is the exact answer.
-        let is_open = q[..m].iter().all(|q| *q >= 0.0);
-        if !is_open {
-            let coupling = self
-                .coupling_compliance
-                .as_ref()
-                .map(|matrix| CouplingCompliance { matrix, reference });
-            let w = &mut w_matrix[..m * m];
-            let assembled = match &mut self.constrained {
-                None => {
-                    if pairs.ensure(planes.iter().map(|plane| plane.candidate), part) {
-                        delassus_into(&*pairs, planes, coupling, w)
-                    } else {
-                        delassus_into(part, planes, coupling, w)
-                    }
-                }
-                Some(constrained) => {
-                    let candidates = planes.iter().map(|plane| plane.candidate);
-                    constrained.ensure(candidates, &[], part);
-                    delassus_into(constrained.blocks(), planes, coupling, w)
-                }
-            };
-            debug_assert!(assembled.is_ok(), "the matrix has the size of the planes");
-        }
-        clock.lap(Stage::Delassus, report);
-
-        if is_open {
-            self.scratch.z[..m].fill(0.0);
-            (report.certificate, report.lcp_solved) = (0.0, true);
-        } else {
-            self.scratch.solve(m, &self.settings.lcp, report);
-        }
-        clock.lap(Stage::Lcp, report);
-
-        // Forces of the near nodes become the state; the tool goes where its coupling balances.
-        self.scratch.adopt_forces(m);
-        if let Some(constrained) = &mut self.constrained {
-            constrained.forget_terms();
-        }
-        let (force, torque) = wrench_on_tool(&self.scratch.planes, &self.scratch.z[..m], reference);
-        report.contact_wrench_on_tool = [force.x, force.y, force.z, torque.x, torque.y, torque.z];
-        if let Some(compliance) = &self.coupling_compliance {
-            self.deviation = compliance.map(|row| {
-                row.iter()
-                    .zip(&report.contact_wrench_on_tool)
-                    .map(|(c, f)| c * f)
-                    .sum()
-            });
-        }
-        let moved = VirtualCoupling::pose_from_deviation(target, &self.deviation);
-        let mut change = (moved.translation - tool_pose.translation).length()
-            + self.reach_of_rotation * moved.rotation.angle_between(tool_pose.rotation);
-        *tool_pose = moved;
-        let Scratch {
-            planes,
-            u_before,
-            active,
-            known,
-            pairs,
-            ..
-        } = &mut self.scratch;
-        let deformed = Deformed {
-            part,
-            active,
-            constrained: self.constrained.as_deref(),
-            pairs,
-        };
-        known.forget();
-        for (plane, before) in planes.iter().zip(u_before.iter()) {
-            let u = deformed.displacement(plane.candidate as usize);
-            if deformed.constrained.is_none() {
-                known.set(plane.candidate as usize, u);
-            }
-            change = change.max((u - *before).length());
-        }
-        clock.lap(Stage::Update, report);
-        change
     }
 
     /// Fills in both sides of the tool's equilibrium.

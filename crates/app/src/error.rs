@@ -46,6 +46,11 @@ pub enum Error {
         /// What the system says.
         source: std::io::Error,
     },
+    /// The engine beside the haptic loop ended before the loop.
+    #[error(
+        "the engine beside the haptic loop ended before its time; the device was released and nothing was written; run with accuracy.rates = \"one\" and report this"
+    )]
+    EngineEnded,
     /// Input that fits no command.
     #[error("{0}")]
     Input(String),

@@ -13,8 +13,8 @@ use crate::fields::FieldSolver;
 use crate::machine::Machine;
 use crate::prepare::PreparedPart;
 use crate::report::{
-    ContactForce, Effect, Facts, Frame, Handbook, HandbookRow, Outputs, PaperStage, Phase, Run,
-    StepRow, View,
+    ContactForce, Effect, Facts, Frame, Handbook, HandbookRow, Outputs, PaperStage, Phase,
+    RateFacts, Run, StepRow, TwoRateFacts, View,
 };
 use crate::scene::{EffectChoice, Scene, ToolShape};
 use crate::session::{Record, Recording, part_extent};
@@ -119,6 +119,7 @@ impl Story<'_> {
                 missed_deadlines: recording.servo.missed_deadlines,
                 max_principal_strain: strain,
                 max_rotation_deg: extremes.max_rotation.to_degrees(),
+                rates: rate_facts(recording),
             },
             handbook: self.handbook(&rows),
             paper: paper(&rows),
@@ -298,6 +299,26 @@ impl Story<'_> {
                 .map(|(travel, force)| (travel + touch, *force))
                 .collect(),
         })
+    }
+}
+
+fn rate_facts(recording: &Recording) -> RateFacts {
+    let two = recording.two_rates.as_ref().map(|two| {
+        let (difference_median_n, difference_max_n) = two.differences();
+        TwoRateFacts {
+            every: recording.rates.every.filter(|_| !recording.rates.is_beside),
+            hand_overs: two.log.hand_overs.len() as u64,
+            difference_median_n,
+            difference_max_n,
+            max_staleness: two.log.max_staleness,
+            beyond_margin: two.log.beyond_margin,
+            faded: two.log.faded,
+            engine_us: two.step_us(),
+        }
+    });
+    RateFacts {
+        why: recording.rates.why.clone(),
+        two,
     }
 }
 

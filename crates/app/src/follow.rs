@@ -56,7 +56,9 @@ impl Follower {
             .seen_at
             .map_or(0.0, |then| (tool_at.translation - then).length());
         self.seen_at = Some(tool_at.translation);
-        let within = LOOK_AHEAD * engine.settings().max_stride + MOTIONS_AHEAD * moved;
+        let within = LOOK_AHEAD * engine.settings().max_stride
+            + MOTIONS_AHEAD * moved
+            + engine.reach_between_nodes();
         let wanted = self.demand.wanted(engine.tool(), &tool_at, drawn, within);
         if wanted.is_empty() {
             return;

@@ -8,6 +8,7 @@ mod bubbles;
 pub mod budget;
 pub mod cache;
 mod demand;
+mod surface;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -15,7 +16,7 @@ use std::time::Instant;
 
 use fem::{
     BubbleCompliance, Compliance, ComplianceChecks, FactoredStiffness, Material, Mesh, Order,
-    Quadrature, Supports,
+    OrderedStiffness, Quadrature, Supports,
 };
 use glam::DVec3;
 use gpu::Scalar;
@@ -487,7 +488,11 @@ fn build(loaded: &LoadedPart, ui: &Ui<'_>) -> Result<Built, Error> {
     };
     let stiffness = assemble(loaded)?;
     done("assemble the stiffness", &mut seconds);
-    let factor = FactoredStiffness::new(&stiffness, &loaded.supports, &progress)
+    let ordered = OrderedStiffness::new(&stiffness, &loaded.supports, &progress)
+        .map_err(|e| Error::part(path, e))?;
+    done("order the unknowns", &mut seconds);
+    let factor = ordered
+        .factor(&progress)
         .map_err(|e| Error::part(path, e))?;
     done("factor", &mut seconds);
     let compliance = Compliance::build(&factor, &loaded.candidates, &loaded.rows, &progress)

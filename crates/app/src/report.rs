@@ -24,7 +24,7 @@ use std::path::{Path, PathBuf};
 pub use curve::Curve;
 pub use data::{
     CellKind, ContactForce, Effect, Facts, Frame, Handbook, HandbookRow, N_STAGES, Outputs,
-    PaperStage, PartDrawing, Phase, Run, STAGE_NAMES, StepRow, View,
+    PaperStage, PartDrawing, Phase, RateFacts, Run, STAGE_NAMES, StepRow, TwoRateFacts, View,
 };
 pub use error::ReportError;
 

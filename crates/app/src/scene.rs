@@ -340,8 +340,14 @@ pub struct Accuracy {
     pub lcp_tolerance: f64,
     /// Rounds of pivoting in one contact problem; `None`: as many as it takes.
     pub lcp_rounds: Option<usize>,
-    /// Planes kept in one step, the deepest first.
+    /// Rows of one contact problem; more near nodes than that share rows.
     pub max_contacts: usize,
+    /// Whether the haptic loop solves whole steps.
+    pub rates: Rates,
+    /// Whether the tool's corners and edges touch the part between its nodes.
+    pub tool_features: ToolFeatures,
+    /// Relative error of the resultant by sharing rows above which a step is counted and reported, > 0.
+    pub merge_tolerance: f64,
     /// Number type of the displacement multiply.
     pub scalar: Scalar,
     /// Number type in which the step reads the compliance between nodes that can touch.
@@ -377,6 +383,9 @@ impl Accuracy {
             lcp_tolerance: raw::default::LCP_TOLERANCE,
             lcp_rounds: None,
             max_contacts: raw::default::MAX_CONTACTS as usize,
+            rates: Rates::Auto,
+            tool_features: ToolFeatures::Auto,
+            merge_tolerance: raw::default::MERGE_TOLERANCE,
             scalar: Scalar::F64,
             contact_scalar: Scalar::F64,
             columns: Columns::Auto,
@@ -419,8 +428,12 @@ impl Accuracy {
             Scalar::F32 => "f32",
         };
         let preset = self.preset.map(|p| format!("{}: ", p.name()));
+        let rates = match self.rates {
+            Rates::Auto | Rates::One => String::new(),
+            Rates::Every(n) => format!(", results {n} periods later"),
+        };
         format!(
-            "{}{planes}, interface nodes {}, LCP to {:e}, contact in {}, shape in {}",
+            "{}{planes}, interface nodes {}, LCP to {:e}, contact in {}, shape in {}{rates}",
             preset.unwrap_or_default(),
             self.adaptive.words(),
             self.lcp_tolerance,
@@ -447,6 +460,34 @@ impl Adaptive {
             PMethod::Constrain => format!("{which} (constrain)"),
         }
     }
+}
+
+/// Whether the haptic loop solves whole steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Rates {
+    /// Yes; in real time only if they fit the period, by measurement.
+    #[default]
+    Auto,
+    /// Yes.
+    One,
+    /// No: the engine runs beside it, and its results are there so many servo periods later, in
+    /// [1, 50]; in real time as soon as they are solved.
+    Every(u32),
+}
+
+/// Whether the tool's corners and sharp edges touch the part's faces between its nodes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ToolFeatures {
+    /// If the tool has some and the contact groups have faces.
+    #[default]
+    Auto,
+    /// Or else an error, which names this line of the scene.
+    On {
+        /// Line of the key.
+        line: usize,
+    },
+    /// Contact at the part's nodes only.
+    Off,
 }
 
 /// Bend of an edge, as a share of the largest displacement, that a picture of a thousand pixels

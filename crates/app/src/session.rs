@@ -5,11 +5,20 @@
 //! the part stays; if it holds the part, the tool stays, and contact is solved in the part's frame
 //! all the same.
 
+mod beside;
+pub mod fast;
+pub mod handover;
+mod overlap;
+pub mod rates;
+mod recorder;
+pub mod slew;
+pub mod slow;
+
 use std::ops::Range;
 use std::time::Instant;
 
 use device::{
-    AsFastAsPossible, Clock, HandSettings, HandleState, Insertion, Phase, RealTime, Script, Servo,
+    AsFastAsPossible, Clock, HandSettings, HapticDevice, Insertion, Phase, RealTime, Script, Servo,
     ServoReport, ServoSettings, Simulated, SimulatedEvents, SimulatedHand, SimulatedSettings,
     Wrench,
 };
@@ -18,10 +27,14 @@ use glam::DVec3;
 use glamx::DPose3;
 
 use crate::engine::{ActiveContact, Engine, StepReport};
-use crate::follow::Follower;
-use crate::prepare::{PreparedCompliance, PreparedPart};
+use crate::prepare::PreparedPart;
 use crate::shape::{self, Shape};
 use crate::{Error, interrupt};
+use fast::FastSettings;
+use overlap::refuse_overlap;
+use rates::{ChosenRates, Rates, TwoRates, choose};
+use recorder::{Recorder, Solved};
+use slow::{SlowStep, Stepped};
 
 /// Servo periods between two evaluations of the whole surface: 60 Hz at 1 kHz.
 const DISPLAY_INTERVAL: u64 = 16;
@@ -65,6 +78,10 @@ pub struct Recording {
     pub device: SimulatedEvents,
     /// Largest displacement of a surface node, m, seen at display rate.
     pub max_surface_displacement: f64,
+    /// Whether whole steps were solved in the loop, and why.
+    pub rates: ChosenRates,
+    /// What two rates tell, if there were two.
+    pub two_rates: Option<TwoRates>,
     contacts: Vec<ActiveContact>,
     bubbles: Vec<(u32, DVec3)>,
 }
@@ -117,14 +134,17 @@ pub struct SessionSpec {
     pub hand: HandSettings,
     /// s.
     pub period_s: f64,
-    /// Whether to wait for the real clock; the results are the same.
+    /// Whether to wait for the real clock; with one rate the results are the same.
     pub real_time: bool,
+    /// Whether whole steps are solved in the loop.
+    pub rates: Rates,
 }
 
 /// Runs the script to its end.
 ///
 /// # Errors
-/// A script that the device cannot follow; a tool that overlaps the part at the start; Ctrl-C.
+/// A script that the device cannot follow; a tool that overlaps the part at the start; an engine that ended on its
+/// own beside the loop; Ctrl-C.
 pub fn run(
     spec: &SessionSpec,
     prepared: &PreparedPart,
@@ -148,187 +168,153 @@ pub fn run(
     let n_periods = script.periods(spec.period_s);
     let hand = SimulatedHand::new(spec.hand, script, spec.period_s)?;
     let device = Simulated::new(SimulatedSettings::default(), hand)?;
-    let session = Session {
-        spec,
-        script,
-        start,
-        engine,
-        recording: Recording {
-            records: Vec::with_capacity(n_periods as usize),
-            direction: spec.direction.normalize(),
-            servo: ServoReport::default(),
-            device: SimulatedEvents::default(),
-            max_surface_displacement: 0.0,
-            contacts: Vec::with_capacity(64 * n_periods as usize),
-            bubbles: Vec::new(),
-        },
-        shape,
-        follower: match &prepared.compliance {
-            PreparedCompliance::All(_) => None,
-            PreparedCompliance::Near(demand) => Some(Follower::new(demand, spec.real_time)),
-        },
+    shape.follow(spec.real_time);
+    let rates = choose(spec, engine);
+    let fast = FastSettings {
+        period_s: spec.period_s,
+        force_resolution: HapticDevice::limits(&device).force_resolution,
+        lever: part_extent(&prepared.loaded.mesh),
+        n_ticks: n_periods as usize,
     };
-    let settings = ServoSettings::for_limits(device::HapticDevice::limits(&device));
-    if spec.real_time {
-        let servo = Servo::new(RealTime::new(spec.period_s)?, settings)?;
-        session.run(servo, device, n_periods, progress)
-    } else {
-        let servo = Servo::new(AsFastAsPossible::new(spec.period_s)?, settings)?;
-        session.run(servo, device, n_periods, progress)
+    let every = rates.every;
+    let session = Session {
+        recorder: Recorder::new(spec, script, start, n_periods, rates),
+        device,
+        n_periods,
+        progress,
+    };
+    let settings = ServoSettings::for_limits(HapticDevice::limits(&session.device));
+    match (spec.real_time, every) {
+        (false, None) => {
+            let servo = Servo::new(AsFastAsPossible::new(spec.period_s)?, settings)?;
+            session.run_one_rate(servo, engine, shape)
+        }
+        (true, None) => {
+            let servo = Servo::new(RealTime::new(spec.period_s)?, settings)?;
+            session.run_one_rate(servo, engine, shape)
+        }
+        (false, Some(every)) => {
+            let servo = Servo::new(AsFastAsPossible::new(spec.period_s)?, settings)?;
+            session.run_stepped(servo, every, engine, shape, fast)
+        }
+        (true, Some(_)) => {
+            let servo = Servo::new(RealTime::new(spec.period_s)?, settings)?;
+            session.run_beside(servo, engine, shape, fast)
+        }
     }
 }
 
 struct Session<'a> {
-    spec: &'a SessionSpec,
-    script: Script,
-    start: DPose3,
-    engine: &'a mut Engine,
-    recording: Recording,
-    shape: &'a mut Shape,
-    follower: Option<Follower>,
+    recorder: Recorder<'a>,
+    device: Simulated,
+    n_periods: u64,
+    progress: &'a dyn fem::Progress,
 }
 
 impl Session<'_> {
-    fn run<C: Clock>(
+    /// The whole step in the loop.
+    fn run_one_rate<C: Clock>(
         mut self,
         mut servo: Servo<C>,
-        mut device: Simulated,
-        n_periods: u64,
-        progress: &dyn fem::Progress,
+        engine: &mut Engine,
+        shape: &mut Shape,
     ) -> Result<Recording, Error> {
-        for period in 0..n_periods {
+        for period in 0..self.n_periods {
             if interrupt::is_requested() {
-                servo.release(&mut device);
+                servo.release(&mut self.device);
                 return Err(Error::Interrupted);
             }
-            servo.step(&mut device, |handle| self.simulate(handle))?;
+            let recorder = &mut self.recorder;
+            servo.step(&mut self.device, |handle| {
+                let begun = Instant::now();
+                let report = engine.step(&recorder.target(handle));
+                let step_ns = begun.elapsed().as_nanos() as u64;
+                let wrench = recorder.wrench_on_handle(handle, &report);
+                let solved = Solved {
+                    report,
+                    wrench_on_handle: wrench,
+                    step_ns,
+                };
+                recorder.push(handle, &solved, engine.active_contacts());
+                recorder.push_bubbles(engine.bubble_amplitudes());
+                wrench
+            })?;
             if period % DISPLAY_INTERVAL == 0 {
-                self.display()?;
-                progress.advance("insert", period as usize, n_periods as usize);
+                let multiply_ns = self.recorder.display(engine, shape)?;
+                self.recorder.note_multiply(period, multiply_ns);
+                self.tell_progress(period);
             }
         }
-        servo.release(&mut device);
-        self.recording.servo = servo.report();
-        self.recording.device = device.events();
-        Ok(self.recording)
+        servo.release(&mut self.device);
+        Ok(self.recorder.finish(&servo.report(), &self.device))
     }
 
-    /// One haptic step and its record. The record's memory was reserved before the loop.
-    fn simulate(&mut self, handle: &HandleState) -> Wrench {
-        let target = match self.spec.holds {
-            Holds::Tool => handle.pose,
-            Holds::Part => handle.pose.inverse() * self.spec.tool_pose,
-        };
-        let begun = Instant::now();
-        let report = self.engine.step(&target);
-        let step_ns = begun.elapsed().as_nanos() as u64;
-
-        let (held, wrench_on_handle) = match self.spec.holds {
-            // The handle feels the opposite of what the coupling exerts on the tool.
-            Holds::Tool => {
-                let on_tool = Wrench::from_array(&report.coupling_wrench_on_tool);
-                let at_tool = -on_tool;
-                (
-                    report.tool_pose,
-                    at_tool.about(report.tool_pose.translation, handle.pose.translation),
-                )
+    /// Two rates without a real clock: the engine works between two periods, and its result is due `every` later.
+    fn run_stepped<C: Clock>(
+        mut self,
+        mut servo: Servo<C>,
+        every: u64,
+        engine: &mut Engine,
+        shape: &mut Shape,
+        settings: FastSettings,
+    ) -> Result<Recording, Error> {
+        let start = self.recorder.start_target();
+        let mut stepped = Stepped::new(engine, &start, every, settings)?;
+        let mut slow: Vec<SlowStep> = Vec::with_capacity(self.n_periods as usize);
+        let mut shown = None;
+        for period in 0..self.n_periods {
+            if interrupt::is_requested() {
+                servo.release(&mut self.device);
+                return Err(Error::Interrupted);
             }
-            // The part feels the opposite of the tool, at the tool, turned into the world.
-            Holds::Part => {
-                let part = self.spec.tool_pose * report.tool_pose.inverse();
-                let on_tool = Wrench::from_array(&report.contact_wrench_on_tool);
-                let on_part = Wrench::new(
-                    part.rotation * -on_tool.force,
-                    part.rotation * -on_tool.torque,
-                );
-                (
-                    part,
-                    on_part.about(self.spec.tool_pose.translation, handle.pose.translation),
-                )
+            let recorder = &mut self.recorder;
+            let mut asked = None;
+            servo.step(&mut self.device, |handle| {
+                let target = recorder.target(handle);
+                asked = Some(target);
+                recorder.fast_tick(handle, |on_handle| {
+                    let answer = stepped.tick(period, &target, on_handle);
+                    (answer, stepped.fast().active_contacts())
+                })
+            })?;
+            let Some(mut step) = asked.and_then(|target| stepped.work(engine, period, &target))
+            else {
+                continue;
+            };
+            if is_display_due(&mut shown, period) {
+                step.multiply_ns = Some(self.recorder.display(engine, shape)?);
+                self.tell_progress(period);
             }
-        };
-        let recording = &mut self.recording;
-        let contacts_from = recording.contacts.len();
-        recording
-            .contacts
-            .extend_from_slice(self.engine.active_contacts());
-        let bubbles_from = recording.bubbles.len();
-        recording
-            .bubbles
-            .extend_from_slice(self.engine.bubble_amplitudes());
-        recording.records.push(Record {
-            step: recording.records.len() as u64,
-            time_s: handle.time_s,
-            phase: self.script.phase(handle.time_s),
-            handle_pose: handle.pose,
-            travel: (held.translation - self.start.translation).dot(recording.direction),
-            wrench_on_handle,
-            report,
-            step_ns,
-            multiply_ns: None,
-            contacts: contacts_from..recording.contacts.len(),
-            bubbles: bubbles_from..recording.bubbles.len(),
-        });
-        wrench_on_handle
+            slow.push(step);
+        }
+        servo.release(&mut self.device);
+        let log = stepped.into_fast().into_log();
+        self.recorder.two_rates(TwoRates::new(log, slow));
+        Ok(self.recorder.finish(&servo.report(), &self.device))
     }
 
-    /// What the display would do between two steps: the whole surface.
-    fn display(&mut self) -> Result<(), Error> {
-        let begun = Instant::now();
-        let drawn = self.shape.update(self.engine)?;
-        let largest = shape::largest(drawn);
-        let elapsed = begun.elapsed().as_nanos() as u64;
-        if let (Some(follower), Some(last)) = (&mut self.follower, self.recording.records.last()) {
-            follower.look(self.engine, last.report.tool_pose, drawn);
-        }
-        self.recording.max_surface_displacement =
-            self.recording.max_surface_displacement.max(largest);
-        if let Some(last) = self.recording.records.last_mut() {
-            last.multiply_ns = Some(elapsed);
-        }
-        Ok(())
+    fn tell_progress(&self, period: u64) {
+        let total = self.n_periods as usize;
+        self.progress.advance("insert", period as usize, total);
     }
 }
 
-/// A tool that starts inside the part has no path to where it is: refused with the depth.
-fn refuse_overlap(spec: &SessionSpec, mesh: &Mesh, engine: &Engine) -> Result<(), Error> {
-    let tool = engine.tool();
-    let deepest = mesh
-        .surface_nodes()
-        .into_iter()
-        .map(|node| {
-            let x = DVec3::from_array(mesh.nodes[node as usize]);
-            (
-                tool.signed_distance(&spec.tool_pose, x).signed_distance,
-                node,
-            )
-        })
-        .min_by(|a, b| a.0.total_cmp(&b.0));
-    if let Some((distance, node)) = deepest
-        && distance < 0.0
-    {
-        return Err(Error::Input(format!(
-            "the tool starts inside the part: node {} of the mesh is {:.3} mm inside it; move \
-             tool.position back, against hand.direction",
-            mesh.node_tags[node as usize],
-            -1e3 * distance
-        )));
+/// Whether the display's interval is over since it was shown last; it is shown now then.
+fn is_display_due(shown: &mut Option<u64>, tick: u64) -> bool {
+    let is_due = shown.is_none_or(|last| tick >= last + DISPLAY_INTERVAL);
+    if is_due {
+        *shown = Some(tick);
     }
-    // A tool smaller than an element can hide between the nodes.
-    let inside = tool
-        .tessellate(part_extent(mesh))
-        .0
-        .into_iter()
-        .map(|p| spec.tool_pose * p)
-        .find(|p| fem::stress::locate(mesh, p.to_array()).is_some());
-    match inside {
-        Some(p) => Err(Error::Input(format!(
-            "the tool starts inside the part: its surface at {:.4} {:.4} {:.4} m is in an element; \
-             move tool.position back, against hand.direction",
-            p.x, p.y, p.z
-        ))),
-        None => Ok(()),
-    }
+    is_due
+}
+
+/// What the display would do between two steps: the whole surface. Its largest displacement, m, and the time, ns.
+fn timed_display(engine: &mut Engine, shape: &mut Shape) -> Result<(f64, u64), Error> {
+    let begun = Instant::now();
+    let largest = shape::largest(shape.update(engine)?);
+    let elapsed_ns = begun.elapsed().as_nanos() as u64;
+    shape.look_ahead(engine);
+    Ok((largest, elapsed_ns))
 }
 
 /// m, diagonal of the part's bounding box.
@@ -346,3 +332,6 @@ pub fn part_extent(mesh: &Mesh) -> f64 {
         .sum::<f64>()
         .sqrt()
 }
+
+#[cfg(test)]
+mod tests;

@@ -5,8 +5,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use contact::lcp;
+use contact::surface::Surface;
 use contact::tool::{
-    BoxShape, Capsule, Cylinder, DistanceField, HalfSpace, Mesh as ToolMesh, Sphere, Tool,
+    BoxShape, Capsule, Cylinder, DistanceField, Features, HalfSpace, Mesh as ToolMesh, Sphere, Tool,
 };
 use device::{HandSettings, VirtualCoupling};
 use fem::{Material, Quadrature};
@@ -16,7 +17,10 @@ use crate::engine::{ContactIterations, Engine, EngineSettings, FreeSettings};
 use crate::machine::Machine;
 use crate::prepare::budget::bytes;
 use crate::prepare::{BubbleReach, ColumnChoice, GroupRef, PartSpec, PreparedPart};
-use crate::scene::{self, Adaptive, FreeNodes, PMethod, QuadratureRule, Scene, ToolShape};
+use crate::scene::{
+    self, Adaptive, FreeNodes, PMethod, QuadratureRule, Scene, ToolFeatures, ToolShape,
+};
+use crate::session::rates::Rates;
 use crate::session::{Holds, SessionSpec, part_extent};
 
 /// The part of a scene.
@@ -211,6 +215,7 @@ pub fn engine(scene: &Scene, prepared: &PreparedPart, tool: Tool) -> Result<Engi
         displacement_tolerance: DISPLACEMENT_TOLERANCE,
         near_distance: scene.accuracy.near_distance.unwrap_or(NEAR_SHARE * size),
         max_contacts: scene.accuracy.max_contacts,
+        merge_tolerance: scene.accuracy.merge_tolerance,
         lcp: lcp_settings(scene),
         max_stride: STRIDE_SHARE * size,
     };
@@ -218,6 +223,11 @@ pub fn engine(scene: &Scene, prepared: &PreparedPart, tool: Tool) -> Result<Engi
         scene.coupling.translational_stiffness,
         scene.coupling.rotational_stiffness,
     )?;
+    let in_scene = |source| Error::Tool {
+        path: scene.path.clone(),
+        source,
+    };
+    let edges = tool_edges(scene, prepared, &tool)?;
     let (bubbles, whole) = (&prepared.bubbles, prepared.compliance.all());
     let engine = match (scene.accuracy.adaptive, bubbles, whole) {
         (
@@ -238,10 +248,67 @@ pub fn engine(scene: &Scene, prepared: &PreparedPart, tool: Tool) -> Result<Engi
         }
         _ => Engine::new(prepared.contact_part(), tool, Some(coupling), settings),
     };
-    engine.map_err(|source| Error::Tool {
+    let engine = engine.map_err(in_scene)?;
+    if let (Some(_), scene::Rates::Every(_)) = (&edges, scene.accuracy.rates) {
+        return Err(Error::Input(format!(
+            "{}: accuracy.rates.every does not go with a tool whose corners and edges touch; write tool_features = \
+             \"off\", or leave rates out",
+            scene.path.display()
+        )));
+    }
+    Ok(match edges {
+        Some((surface, features)) => engine.with_edges(surface, features),
+        None => engine,
+    })
+}
+
+/// The part's faces and the tool's corners and edges, where the scene wants them to touch and there are both.
+///
+/// # Errors
+/// A scene that insists on what is not there.
+pub fn tool_edges(
+    scene: &Scene,
+    prepared: &PreparedPart,
+    tool: &Tool,
+) -> Result<Option<(Surface, Features)>, Error> {
+    /// Of the smallest face, the distance of the points on an edge: the edge then meets each face in one at least.
+    const SPACING_SHARE: f64 = 0.5;
+    let insists = match scene.accuracy.tool_features {
+        ToolFeatures::Off => return Ok(None),
+        ToolFeatures::Auto => None,
+        ToolFeatures::On { line } => Some(line),
+    };
+    let is_constrained = matches!(
+        scene.accuracy.adaptive,
+        Adaptive::On {
+            method: PMethod::Constrain,
+            ..
+        }
+    );
+    let missing = |what: &str| match insists {
+        Some(line) => Err(Error::Input(format!(
+            "{}:{line}: accuracy.tool_features is \"on\", but {what}; use \"auto\" or leave the key out",
+            scene.path.display()
+        ))),
+        None => Ok(None),
+    };
+    if is_constrained {
+        return missing("the interface nodes are constrained");
+    }
+    let in_scene = |source| Error::Tool {
         path: scene.path.clone(),
         source,
-    })
+    };
+    if !Features::has_some(tool) {
+        return missing("the tool has neither corners nor sharp edges");
+    }
+    let Some(surface) = prepared.contact_surface().map_err(in_scene)? else {
+        return missing("the contact groups of the mesh have no faces");
+    };
+    let sizes = (0..surface.n_faces()).map(|face| surface.size(face));
+    let spacing = SPACING_SHARE * sizes.fold(f64::INFINITY, f64::min);
+    let features = Features::new(tool, spacing).map_err(in_scene)?;
+    Ok(features.map(|features| (surface, features)))
 }
 
 /// Sweeps of Gauss-Seidel for each round of pivoting that was allowed: a sweep costs about a tenth of
@@ -298,5 +365,10 @@ pub fn session(scene: &Scene) -> SessionSpec {
         },
         period_s: scene.device.servo_period,
         real_time: scene.device.real_time,
+        rates: match scene.accuracy.rates {
+            scene::Rates::Auto => Rates::Auto,
+            scene::Rates::One => Rates::One,
+            scene::Rates::Every(n) => Rates::Every(n),
+        },
     }
 }

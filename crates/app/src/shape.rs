@@ -14,6 +14,7 @@ use gpu::{Layout, Multiply};
 
 use crate::Error;
 use crate::engine::Engine;
+use crate::follow::Follower;
 use crate::prepare::{Demand, PreparedCompliance, PreparedPart};
 use crate::scene::{Accuracy, Adaptive, PMethod};
 use crate::setup;
@@ -25,6 +26,7 @@ pub struct Shape {
     columns: Vec<u32>,
     forces: Vec<f64>,
     displacement: Vec<f64>,
+    follower: Option<Follower>,
 }
 
 enum Kind {
@@ -60,6 +62,7 @@ impl Shape {
                     columns: Vec::new(),
                     forces: Vec::new(),
                     displacement: vec![0.0; 3 * n_rows],
+                    follower: None,
                 });
             }
         };
@@ -88,7 +91,23 @@ impl Shape {
             columns: Vec::with_capacity(n_columns),
             forces: Vec::with_capacity(3 * n_columns),
             displacement: vec![0.0; 3 * n_rows],
+            follower: None,
         })
+    }
+
+    /// Where columns are fetched: [`Self::look_ahead`] does so from now on. `beside`: in a thread of its own, so that
+    /// nobody waits; otherwise runs are alike.
+    pub fn follow(&mut self, beside: bool) {
+        if let Kind::Fetched(demand) = &self.kind {
+            self.follower = Some(Follower::new(demand, beside));
+        }
+    }
+
+    /// Fetches columns where the tool goes, by the shape of the last [`Self::update`].
+    pub fn look_ahead(&mut self, engine: &Engine) {
+        if let (Some(follower), Some(tool_pose)) = (&mut self.follower, engine.tool_pose()) {
+            follower.look(engine, tool_pose, &self.displacement);
+        }
     }
 
     /// Interface nodes of the surface that are drawn where they are, if some are interpolated.

@@ -39,13 +39,48 @@ pub fn delassus_into(
     w: &mut [f64],
 ) -> Result<(), Error> {
     let m = planes.len();
-    if w.len() != m * m {
-        return Err(Error::Length {
-            what: "the Delassus operator",
-            expected: m * m,
-            actual: w.len(),
-        });
+    delassus_block_into(compliance, planes, coupling, m, w)
+}
+
+/// As [`delassus_into`], for the leading block of an operator with `m` rows, more than there are planes: what follows are
+/// rows of another kind ([`crate::face_row`]).
+///
+/// # Errors
+/// [`Error::Length`] unless `w` has m² entries and m is no less than the number of planes.
+pub fn delassus_block_into(
+    compliance: &impl ComplianceBlocks,
+    planes: &[Plane],
+    coupling: Option<CouplingCompliance>,
+    m: usize,
+    w: &mut [f64],
+) -> Result<(), Error> {
+    check_size(w, m.max(planes.len()))?;
+    for_each_entry(compliance, planes, coupling, |i, j, entry| {
+        w[j * m + i] = entry;
+        w[i * m + j] = entry;
+    });
+    Ok(())
+}
+
+pub(crate) fn check_size(w: &[f64], m: usize) -> Result<(), Error> {
+    if w.len() == m * m {
+        return Ok(());
     }
+    Err(Error::Length {
+        what: "the Delassus operator",
+        expected: m * m,
+        actual: w.len(),
+    })
+}
+
+/// Tells W_ij of the planes for all i <= j.
+#[inline]
+pub(crate) fn for_each_entry(
+    compliance: &impl ComplianceBlocks,
+    planes: &[Plane],
+    coupling: Option<CouplingCompliance>,
+    mut tell: impl FnMut(usize, usize, f64),
+) {
     for (j, plane_j) in planes.iter().enumerate() {
         let twist = coupling.map(|coupling| twist_per_force(&coupling, plane_j));
         for (i, plane_i) in planes[..=j].iter().enumerate() {
@@ -55,16 +90,13 @@ pub fn delassus_into(
                 // (r × n) · θ = n · (θ × r): the point of the tool at i moves away.
                 displacement += translation + rotation.cross(plane_i.point - coupling.reference);
             }
-            let entry = plane_i.normal.dot(displacement);
-            w[j * m + i] = entry;
-            w[i * m + j] = entry;
+            tell(i, j, plane_i.normal.dot(displacement));
         }
     }
-    Ok(())
 }
 
 /// K_c⁻¹ h of one plane: how far the tool yields to a unit normal force.
-fn twist_per_force(coupling: &CouplingCompliance, plane: &Plane) -> (DVec3, DVec3) {
+pub(crate) fn twist_per_force(coupling: &CouplingCompliance, plane: &Plane) -> (DVec3, DVec3) {
     let row = plane.tool_row(coupling.reference);
     let twist = coupling
         .matrix

@@ -33,6 +33,16 @@ pub enum Error {
         /// Length given.
         actual: usize,
     },
+    /// A face names a node that does not exist.
+    #[error("face {face} names node {node}, the part has {n_nodes} that can touch or are held")]
+    NoSuchNode {
+        /// Face, from 0.
+        face: usize,
+        /// The node it names, from 0.
+        node: u32,
+        /// Candidates and held nodes together.
+        n_nodes: usize,
+    },
     /// The complementarity problem is larger than its scratch.
     #[error("{rows} contact rows exceed the capacity of {capacity}; make the scratch larger")]
     Capacity {

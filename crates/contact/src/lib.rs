@@ -2,7 +2,8 @@
 //!
 //! The way of the data: a [`proximity::NodeTree`] finds the candidate nodes near a [`tool::Tool`]; each gets
 //! a [`plane::Plane`]; the caller's compliance blocks become the Delassus operator in [`delassus`]; [`lcp`] finds
-//! the normal forces and certifies them, [`friction`] the tangential ones where a scene calls for them; [`plane::wrench_on_tool`] sums them up. Everything is in the part's frame
+//! the normal forces and certifies them, [`friction`] the tangential ones where a scene calls for them; [`plane::wrench_on_tool`] sums them up. What of a tool's corners and edges comes between the nodes is found by
+//! [`tool::Features`] against the faces of a [`surface::Surface`] and adds rows of its own, [`face_row`]. Everything is in the part's frame
 //! and in SI units. This crate knows no finite elements.
 //!
 //! ```
@@ -56,10 +57,14 @@
 
 pub mod delassus;
 mod error;
+pub mod face;
+pub mod face_row;
 pub mod friction;
 pub mod lcp;
+pub mod patch;
 pub mod plane;
 pub mod proximity;
+pub mod surface;
 pub mod tool;
 
 pub use error::Error;

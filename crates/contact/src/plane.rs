@@ -56,7 +56,7 @@ pub fn planes_into(
     max_gap: f64,
     planes: &mut Vec<Plane>,
 ) -> PlaneReport {
-    let beyond = |_, _| ();
+    let beyond = |_, _, _| ();
     planes_and_rest_into(
         tool,
         pose_part_tool,
@@ -68,7 +68,7 @@ pub fn planes_into(
     )
 }
 
-/// As [`planes_into`]; tells `beyond` of each candidate whose gap (m) is `max_gap` or more.
+/// As [`planes_into`]; tells `beyond` of each candidate whose gap (m) is `max_gap` or more, of that gap and where it is.
 pub fn planes_and_rest_into(
     tool: &Tool,
     pose_part_tool: &DPose3,
@@ -76,7 +76,7 @@ pub fn planes_and_rest_into(
     position_of: impl Fn(u32) -> DVec3,
     max_gap: f64,
     planes: &mut Vec<Plane>,
-    mut beyond: impl FnMut(u32, f64),
+    mut beyond: impl FnMut(u32, f64, DVec3),
 ) -> PlaneReport {
     let mut report = PlaneReport::default();
     planes.clear();
@@ -92,7 +92,7 @@ pub fn planes_and_rest_into(
             continue;
         }
         if contact.signed_distance >= max_gap {
-            beyond(candidate, contact.signed_distance);
+            beyond(candidate, contact.signed_distance, point);
             continue;
         }
         let plane = Plane {

@@ -7,6 +7,7 @@
 mod box_shape;
 mod capsule;
 mod cylinder;
+pub mod features;
 mod field;
 mod half_space;
 mod mesh;
@@ -21,6 +22,7 @@ use glamx::DPose3;
 pub use box_shape::BoxShape;
 pub use capsule::Capsule;
 pub use cylinder::Cylinder;
+pub use features::Features;
 pub use field::DistanceField;
 pub use half_space::HalfSpace;
 pub use mesh::{Mesh, MeshRepair};

@@ -3,20 +3,16 @@
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{LltError, LltRegularization};
 use faer::prelude::ReborrowMut;
-use faer::sparse::linalg::cholesky::{
-    LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
-};
-use faer::sparse::{SparseColMat, SymbolicSparseColMat};
+use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
+use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, SymbolicCholeskyRaw};
 use faer::{Conj, MatMut, Par, Side};
 use rayon::prelude::*;
 
 use crate::Error;
 use crate::assembly::Stiffness;
+use crate::ordered::{HELD, OrderedStiffness};
 use crate::progress::Progress;
 use crate::supports::Supports;
-
-/// Degree of freedom that is held.
-const HELD: u32 = u32::MAX;
 
 /// s K_ff = L Lᵀ for the free degrees of freedom f; s is a power of two.
 #[derive(Debug)]
@@ -32,7 +28,8 @@ pub struct FactoredStiffness {
 }
 
 impl FactoredStiffness {
-    /// Eliminates the held degrees of freedom (and nodes of no element) and factors.
+    /// Eliminates the held degrees of freedom (and nodes of no element), orders the others and
+    /// factors: [`OrderedStiffness::new`] and [`OrderedStiffness::factor`].
     ///
     /// # Errors
     /// [`Error::NotPositiveDefinite`], [`Error::TooLarge`], [`Error::Cancelled`].
@@ -41,31 +38,17 @@ impl FactoredStiffness {
         supports: &Supports,
         progress: &dyn Progress,
     ) -> Result<Self, Error> {
-        let n = stiffness.n_dofs();
-        let mut free_of_dof = vec![HELD; n];
-        let mut dof_of_free = Vec::new();
-        for dof in 0..n {
-            let has_stiffness = stiffness.column(dof).any(|(i, v)| i == dof && v != 0.0);
-            if !supports.is_fixed(dof) && has_stiffness {
-                free_of_dof[dof] = dof_of_free.len() as u32;
-                dof_of_free.push(dof as u32);
-            }
-        }
-        let scale = power_of_two_scale(stiffness, &dof_of_free);
-        let lower = lower_triangle(stiffness, &free_of_dof, &dof_of_free, scale);
+        OrderedStiffness::new(stiffness, supports, progress)?.factor(progress)
+    }
 
-        progress.advance("order the unknowns", 0, 1);
-        let symbolic = factorize_symbolic_cholesky(
-            lower.symbolic(),
-            Side::Lower,
-            // Nested dissection by position gave 12 to 70 % more entries on clips: they are thin.
-            SymmetricOrdering::Amd,
-            Default::default(),
-        )
-        .map_err(|e| Error::TooLarge(format!("{e:?}")))?;
-        if progress.is_cancelled() {
-            return Err(Error::Cancelled);
-        }
+    pub(crate) fn of(ordered: OrderedStiffness, progress: &dyn Progress) -> Result<Self, Error> {
+        let OrderedStiffness {
+            symbolic,
+            lower,
+            free_of_dof,
+            dof_of_free,
+            scale,
+        } = ordered;
         progress.advance("factor", 0, 1);
         let mut values = vec![0.0; symbolic.len_val()];
         // One thread: the factor is the same bits on every machine with the same instructions.
@@ -119,6 +102,31 @@ impl FactoredStiffness {
     pub(crate) fn free_of(&self, dof: usize) -> Option<usize> {
         let free = self.free_of_dof[dof];
         (free != HELD).then_some(free as usize)
+    }
+
+    /// L by supernodes.
+    ///
+    /// # Panics
+    /// If nothing is free: a matrix without rows has none.
+    pub(crate) fn supernodes(&self) -> SupernodalLltRef<'_, u32, f64> {
+        match self.symbolic.raw() {
+            SymbolicCholeskyRaw::Supernodal(symbolic) => {
+                SupernodalLltRef::new(symbolic, &self.values)
+            }
+            SymbolicCholeskyRaw::Simplicial(_) => unreachable!("the supernodal form was asked for"),
+        }
+    }
+
+    /// Place of a degree of freedom in the order of elimination, if free.
+    pub(crate) fn position_of(&self, dof: usize) -> Option<usize> {
+        let free = self.free_of(dof)?;
+        let perm = self.symbolic.perm();
+        Some(perm.map_or(free, |perm| perm.arrays().1[free] as usize))
+    }
+
+    /// Power of two by which the factored matrix is larger than the stiffness.
+    pub(crate) fn scale(&self) -> f64 {
+        self.scale
     }
 
     /// Solves for several right-hand sides in place, one column each, in free degrees of freedom.
@@ -209,48 +217,6 @@ impl FactoredStiffness {
         }
         u
     }
-}
-
-/// Power of two that brings the largest diagonal entry of the free part between 1 and 2.
-fn power_of_two_scale(stiffness: &Stiffness, dof_of_free: &[u32]) -> f64 {
-    let diagonal = dof_of_free.iter().flat_map(|&dof| {
-        stiffness
-            .column(dof as usize)
-            .filter(move |(i, _)| *i == dof as usize)
-            .map(|(_, v)| v)
-    });
-    let largest = diagonal.fold(0.0, f64::max);
-    if largest.is_normal() {
-        // The exponent's bits alone are the power of two below.
-        1.0 / f64::from_bits(largest.to_bits() & (0x7ff << 52))
-    } else {
-        1.0
-    }
-}
-
-fn lower_triangle(
-    stiffness: &Stiffness,
-    free_of_dof: &[u32],
-    dof_of_free: &[u32],
-    scale: f64,
-) -> SparseColMat<u32, f64> {
-    let n = dof_of_free.len();
-    let mut starts = vec![0u32];
-    let (mut rows, mut values) = (Vec::new(), Vec::new());
-    for (j, &dof) in dof_of_free.iter().enumerate() {
-        for (i, v) in stiffness.column(dof as usize) {
-            let free = free_of_dof[i];
-            if free != HELD && free as usize >= j {
-                rows.push(free);
-                values.push(scale * v);
-            }
-        }
-        starts.push(rows.len() as u32);
-    }
-    SparseColMat::new(
-        SymbolicSparseColMat::new_checked(n, n, starts, None, rows),
-        values,
-    )
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! From a tetrahedral mesh to the compliance of its surface.
 //!
 //! Mesh of order 1, 2 or 3 ([`mesh`]) → stiffness K ([`assemble_stiffness`]) → held degrees of
-//! freedom eliminated and K factored once ([`FactoredStiffness`]) → columns of K⁻¹ for the nodes
-//! that can touch ([`Compliance`]). Strain and stress of any displacement are in [`stress`].
+//! freedom left out and the others ordered ([`OrderedStiffness`]) → K factored once
+//! ([`FactoredStiffness`]) → columns of K⁻¹ for the nodes that can touch ([`Compliance`]). Strain and stress of any displacement are in [`stress`].
 //! The crate knows nothing of contact, devices or scenes. SI units.
 //!
 //! ```
@@ -32,6 +32,7 @@
 )]
 
 mod assembly;
+mod columns;
 mod compliance;
 mod constrained;
 pub mod element;
@@ -43,6 +44,8 @@ mod hierarchy;
 pub mod load;
 mod material;
 pub mod mesh;
+mod ordered;
+mod ordering;
 mod progress;
 pub mod quadrature;
 mod stiffness;
@@ -58,6 +61,7 @@ pub use factor::FactoredStiffness;
 pub use hierarchy::{Constraint, Constraints, Edge, Hierarchy, Rule};
 pub use material::Material;
 pub use mesh::{Face, Group, Mesh};
+pub use ordered::OrderedStiffness;
 pub use progress::{Progress, Silent};
 pub use quadrature::Quadrature;
 pub use supports::Supports;

@@ -10,4 +10,6 @@ mod fast_path;
 mod p_method;
 mod scenes;
 mod storage;
+mod tool_features;
+mod two_rates;
 mod verify;

@@ -45,7 +45,7 @@ fn forces(scene: &Scene, engine: &mut Engine) -> Vec<f64> {
 fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
     let largest = a.iter().fold(0.0, |m: f64, f| m.max(f.abs()));
-    assert!(largest > 5.0, "{largest} N");
+    assert!(largest > 1.0, "{largest} N");
     a.iter()
         .zip(b)
         .map(|(a, b)| (a - b).abs())
@@ -66,12 +66,20 @@ fn the_force_with_32_bit_compliance_differs_in_the_sixth_digit() {
 }
 
 /// A run whose columns are fetched ahead of the tool gives the curve of one that had them all; only the solutions'
-/// round-off differs, and planes are converged to a nanometre (1e-5 N).
+/// round-off differs, and planes are converged to a nanometre (1e-5 N). A corner between the nodes asks for the
+/// columns of nodes that are not near themselves.
 #[test]
 fn fetched_columns_give_the_force_of_all() {
+    for (scene, mesh) in [("clip.toml", "clip.msh"), ("edge.toml", "hook.msh")] {
+        compare_fetched(scene, mesh);
+    }
+}
+
+fn compare_fetched(scene: &str, mesh: &str) {
     let dir = tempfile::tempdir().unwrap();
-    let text = std::fs::read_to_string(root().join("scenes/clip.toml")).unwrap();
-    std::fs::copy(root().join("scenes/clip.msh"), dir.path().join("clip.msh")).unwrap();
+    let scenes = root().join("scenes");
+    let text = std::fs::read_to_string(scenes.join(scene)).unwrap();
+    std::fs::copy(scenes.join(mesh), dir.path().join(mesh)).unwrap();
     let force = |columns: &str| {
         let scene = dir.path().join(format!("{columns}.toml"));
         let text = text.replace(
@@ -98,7 +106,7 @@ fn fetched_columns_give_the_force_of_all() {
         "{said}"
     );
     let difference = largest_difference(&all, &near);
-    assert!(difference < 1e-6, "{difference}");
+    assert!(difference < 1e-6, "{scene}: {difference}");
 }
 
 /// Columns come from another thread while steps are made. The tool is felt by what is there, nothing that is not there

@@ -11,7 +11,7 @@ use crate::output::Staging;
 use crate::prepare::budget::duration;
 use crate::prepare::prepare;
 use crate::progress::Ui;
-use crate::report::{Curve, Run, summary, write_all};
+use crate::report::{Curve, RateFacts, Run, summary, write_all};
 use crate::scene::Scene;
 use crate::shape::Shape;
 use crate::study::accuracy::resolved;
@@ -25,7 +25,8 @@ pub(super) struct RunArgs {
     /// replaced once the new one is complete.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Wait for the real clock in every period; the results are the same.
+    /// Wait for the real clock in every period; the results are the same, unless steps do not fit the
+    /// period and the engine runs beside the loop.
     #[arg(long)]
     real_time: bool,
     /// Print summary.json instead of the summary.
@@ -54,6 +55,9 @@ pub(super) fn run(args: &RunArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u8
     let progress = ui.progress();
     let mut shape = Shape::new(&prepared, &scene.accuracy)?;
     let recording = session::run(&spec, &prepared, &mut engine, &mut shape, &progress)?;
+    if spec.real_time || recording.two_rates.is_some() {
+        ui.note(&recording.rates.words());
+    }
     let story = Story {
         scene: &scene,
         prepared: &prepared,
@@ -100,7 +104,7 @@ fn text(run: &Run, curve: &Curve, target: &std::path::Path) -> String {
         "{}\n  peak insertion force  {:.3} N at {:.3} mm of travel\n  snap drop             {:.3} N\n  \
          insertion work        {:.3} mJ\n  coupling stiffness    {} N/m, in series with the part\n  \
          step                  median {:.1} us, 99 % below {:.1} us, over {} steps with contact\n  \
-         prepared in           {}{}\n  result                {}\n",
+         {}prepared in           {}{}\n  result                {}\n",
         run.title,
         curve.peak_force_n,
         1e3 * curve.travel_at_peak_m,
@@ -110,6 +114,7 @@ fn text(run: &Run, curve: &Curve, target: &std::path::Path) -> String {
         at(0.5),
         at(0.99),
         times.len(),
+        rates_text(&run.facts.rates),
         duration(run.facts.prepare_s),
         if run.facts.from_cache {
             " from the cache"
@@ -117,5 +122,16 @@ fn text(run: &Run, curve: &Curve, target: &std::path::Path) -> String {
             ""
         },
         target.join("report.html").display(),
+    )
+}
+
+/// The line on two rates; nothing for one.
+fn rates_text(rates: &RateFacts) -> String {
+    let Some(two) = &rates.two else {
+        return String::new();
+    };
+    format!(
+        "two rates             {} hand-overs, {:.1e} N apart (median; {:.1e} N at most), {} periods old at most\n  ",
+        two.hand_overs, two.difference_median_n, two.difference_max_n, two.max_staleness
     )
 }

@@ -43,8 +43,8 @@ const LEAST_WORK: usize = 20_000;
 /// Most work in a step of building, multiply-adds, about 100 µs; larger sets take more steps.
 const MOST_WORK: usize = 400_000;
 
-/// Candidates whose blocks are kept.
-const MOST_KNOWN: usize = 512;
+/// Candidates whose blocks are kept, unless there are more rows.
+pub(super) const MOST_KNOWN: usize = 512;
 
 /// What the step needs to know of the bubbles of a part. Blocks are 3 x 3, column-major inside.
 #[derive(Clone, Debug)]
@@ -173,11 +173,11 @@ impl Constrained {
         data: BubbleData,
         settings: FreeSettings,
         n_candidates: usize,
-        max_rows: usize,
+        max_near: usize,
     ) -> Self {
         let n_bubbles = data.positions.len();
         let max_free = settings.max_free.min(n_bubbles);
-        let capacity = n_candidates.min(MOST_KNOWN.max(max_rows));
+        let capacity = n_candidates.min(MOST_KNOWN.max(max_near));
         let operator = || FreeOperator::new(n_candidates, capacity, n_bubbles, max_free);
         Self {
             free: FreeNodes::new(settings.rule, max_free, data.positions.clone(), SWEEP),

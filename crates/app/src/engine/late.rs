@@ -39,7 +39,7 @@ impl Late {
     /// Once in a step: those with a column come nearer to their place.
     pub(super) fn begin_step(&mut self, part: &ContactPart) {
         self.entries.retain_mut(|entry| {
-            entry.n_left -= u32::from(part.has_column(entry.candidate));
+            entry.n_left -= u32::from(part.is_taken_in(entry.candidate));
             entry.n_left > 0
         });
     }
@@ -49,7 +49,7 @@ impl Late {
     pub(super) fn sort_out(&mut self, planes: &mut Vec<Plane>, part: &ContactPart) -> usize {
         let before = planes.len();
         planes.retain(|plane| {
-            let is_there = part.has_column(plane.candidate);
+            let is_there = part.is_taken_in(plane.candidate);
             if !is_there {
                 self.leave_out(plane);
             }
@@ -89,7 +89,7 @@ mod tests {
 
     #[test]
     fn a_late_node_is_left_out_then_eased_in() {
-        let part = ContactPart::with_fetched(vec![DVec3::ZERO, DVec3::X], 2);
+        let mut part = ContactPart::with_fetched(vec![DVec3::ZERO, DVec3::X], 2);
         let column = || Blocks::F64(Source::Owned(vec![1.0; 18]));
         assert!(part.insert(0, column()));
         let plane = |candidate| Plane {
@@ -104,6 +104,7 @@ mod tests {
             if step == 5 {
                 assert!(part.insert(1, column()));
             }
+            part.take_in();
             late.begin_step(&part);
             let mut planes = vec![plane(0), plane(1)];
             let n_out = late.sort_out(&mut planes, &part);

@@ -1,13 +1,14 @@
 //! What the step needs of a prepared part: candidates at rest and the compliance between them.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::Arc;
 
 use contact::delassus::ComplianceBlocks;
 use glam::{DMat3, DVec3};
-use once_cell::race::OnceBox;
 
 use super::ActiveContact;
+use super::clusters::Clusters;
 use super::constrained::Constrained;
+use super::fetched::{FetchedColumns, norm_squared};
 use super::pairs::Pairs;
 use crate::stored::{Blocks, Source};
 
@@ -16,59 +17,26 @@ use crate::stored::{Blocks, Source};
 pub struct ContactPart {
     rest: Vec<DVec3>,
     columns: Columns,
+    clusters: Clusters,
 }
 
 /// Which columns of the compliance are there.
 #[derive(Debug)]
 enum Columns {
-    /// All: block of row i and candidate j at `j stride + i`.
     All {
+        /// Of row i and candidate j at `j stride + i`.
         blocks: Blocks,
         stride: usize,
-        bounds: Vec<Bounds>,
+        /// m/N, by candidate j: bound on the norm of C_ij for all candidates i.
+        largest: Vec<f64>,
     },
-    /// By candidate those that were fetched; written once each, by another thread if need be, and read without
-    /// waiting.
     Fetched {
-        columns: Box<[OnceBox<Column>]>,
-        n_fetched: AtomicUsize,
-        capacity: usize,
+        columns: Arc<FetchedColumns>,
+        /// By candidate: its column is there and counted in the clusters' norms.
+        is_taken_in: Vec<bool>,
+        /// Columns that are.
+        n_taken_in: usize,
     },
-}
-
-/// One candidate's column: displacement of every row per unit force on it.
-#[derive(Debug)]
-struct Column {
-    blocks: Blocks,
-    bounds: Bounds,
-}
-
-/// Largest Frobenius norms of the 3x3 blocks in a candidate's column, m/N.
-#[derive(Clone, Copy, Debug)]
-struct Bounds {
-    /// Of all candidates.
-    any: f64,
-    /// Of all but the candidate itself.
-    other: f64,
-}
-
-impl Bounds {
-    /// Of candidate `own`, whose column's blocks of the candidates are these.
-    fn new(own: usize, blocks: impl Iterator<Item = DMat3>) -> Self {
-        let (mut other, mut of_itself) = (0.0_f64, 0.0);
-        for (i, block) in blocks.enumerate() {
-            let norm = norm_squared(&block);
-            if i == own {
-                of_itself = norm;
-            } else {
-                other = other.max(norm);
-            }
-        }
-        Self {
-            any: other.max(of_itself).sqrt(),
-            other: other.sqrt(),
-        }
-    }
 }
 
 impl ContactPart {
@@ -94,13 +62,19 @@ impl ContactPart {
         );
         assert!(n_rows >= rest.len(), "the candidates are the first rows");
         let column = |j: usize| (j * n_rows..j * n_rows + rest.len()).map(|k| blocks.get(k));
-        let bounds = (0..rest.len()).map(|j| Bounds::new(j, column(j))).collect();
+        let largest = (0..rest.len())
+            .map(|j| column(j).map(|c| norm_squared(&c)).fold(0.0, f64::max))
+            .map(f64::sqrt)
+            .collect();
+        let mut clusters = Clusters::new(&rest);
+        clusters.add_all(|i, j| blocks.get(j * n_rows + i));
         Self {
             columns: Columns::All {
                 blocks,
                 stride: n_rows,
-                bounds,
+                largest,
             },
+            clusters,
             rest,
         }
     }
@@ -108,51 +82,79 @@ impl ContactPart {
     /// A part whose columns come one by one, [`Self::insert`], `capacity` of them at most. A candidate without a column
     /// cannot be touched: the step leaves it out and says so.
     pub fn with_fetched(rest: Vec<DVec3>, capacity: usize) -> Self {
+        let clusters = Clusters::new(&rest);
+        let columns = FetchedColumns::new(&rest, &clusters, capacity);
+        Self::of_fetched(rest, clusters, Arc::new(columns))
+    }
+
+    fn of_fetched(rest: Vec<DVec3>, clusters: Clusters, columns: Arc<FetchedColumns>) -> Self {
         Self {
             columns: Columns::Fetched {
-                columns: rest.iter().map(|_| OnceBox::new()).collect(),
-                n_fetched: AtomicUsize::new(0),
-                capacity,
+                columns,
+                is_taken_in: vec![false; rest.len()],
+                n_taken_in: 0,
             },
+            clusters,
             rest,
         }
     }
 
+    /// Where columns come one by one: the same columns, with a reckoning of their own of those that were taken in.
+    pub(super) fn view(&self) -> Option<Self> {
+        let Columns::Fetched { columns, .. } = &self.columns else {
+            return None;
+        };
+        let clusters = Clusters::new(&self.rest);
+        let columns = Arc::clone(columns);
+        Some(Self::of_fetched(self.rest.clone(), clusters, columns))
+    }
+
     /// Gives a candidate its column: blocks of every row, the candidates first. From any thread, while steps are made;
-    /// the step sees it at once. False if there is no room or it is there already.
+    /// the next step sees it. False if there is no room or it is there already.
     ///
     /// # Panics
     /// If the column is shorter than the candidates, or the part was made with all of them (a programmer's mistake).
     pub fn insert(&self, candidate: u32, blocks: Blocks) -> bool {
-        let Columns::Fetched {
-            columns,
-            n_fetched,
-            capacity,
-        } = &self.columns
-        else {
+        let Columns::Fetched { columns, .. } = &self.columns else {
             panic!("this part has all its columns");
         };
         assert!(blocks.len() >= self.rest.len(), "a column has every row");
-        if n_fetched.fetch_add(1, Ordering::Relaxed) >= *capacity {
-            n_fetched.fetch_sub(1, Ordering::Relaxed);
-            return false;
-        }
-        let own = candidate as usize;
-        let bounds = Bounds::new(own, (0..self.rest.len()).map(|i| blocks.get(i)));
-        let column = Box::new(Column { blocks, bounds });
-        let is_new = columns[own].set(column).is_ok();
-        if !is_new {
-            n_fetched.fetch_sub(1, Ordering::Relaxed);
-        }
-        is_new
+        columns.insert(&self.clusters, candidate, blocks)
     }
 
-    /// Whether the candidate can be touched.
-    #[inline]
+    /// Takes in the columns that have come: once in a step, so that all of it sees the same. Does not allocate.
+    pub(super) fn take_in(&mut self) {
+        if let Columns::Fetched {
+            columns,
+            is_taken_in,
+            n_taken_in,
+        } = &mut self.columns
+        {
+            let n_arrived = columns.n_arrived();
+            for candidate in (*n_taken_in..n_arrived).map(|k| columns.arrived(k)) {
+                if let Some(column) = columns.get(candidate as usize) {
+                    self.clusters.raise(candidate, &column.norms);
+                    is_taken_in[candidate as usize] = true;
+                }
+            }
+            *n_taken_in = n_arrived;
+        }
+    }
+
+    /// Whether the candidate's column is there.
     pub fn has_column(&self, candidate: u32) -> bool {
         match &self.columns {
             Columns::All { .. } => true,
-            Columns::Fetched { columns, .. } => columns[candidate as usize].get().is_some(),
+            Columns::Fetched { columns, .. } => columns.get(candidate as usize).is_some(),
+        }
+    }
+
+    /// Whether the candidate can be touched in this step.
+    #[inline]
+    pub(super) fn is_taken_in(&self, candidate: u32) -> bool {
+        match &self.columns {
+            Columns::All { .. } => true,
+            Columns::Fetched { is_taken_in, .. } => is_taken_in[candidate as usize],
         }
     }
 
@@ -160,7 +162,7 @@ impl ContactPart {
     pub fn n_columns(&self) -> usize {
         match &self.columns {
             Columns::All { .. } => self.rest.len(),
-            Columns::Fetched { n_fetched, .. } => n_fetched.load(Ordering::Relaxed),
+            Columns::Fetched { columns, .. } => columns.n_arrived(),
         }
     }
 
@@ -177,11 +179,10 @@ impl ContactPart {
             self.rest.len(),
             "one bound for each candidate"
         );
-        if let Columns::All { bounds, .. } = &mut self.columns {
-            for (bounds, &other) in bounds.iter_mut().zip(others) {
-                (bounds.any, bounds.other) = (other, other);
-            }
+        if let Columns::All { largest, .. } = &mut self.columns {
+            largest.copy_from_slice(others);
         }
+        self.clusters.bound_by(others);
         self
     }
 
@@ -206,7 +207,7 @@ impl ContactPart {
         };
         match &self.columns {
             Columns::All { blocks, stride, .. } => blocks.sum_transposed(i * stride, terms()),
-            Columns::Fetched { columns, .. } => match columns[i].get() {
+            Columns::Fetched { columns, .. } => match columns.get(i) {
                 Some(column) => column.blocks.sum_transposed(0, terms()),
                 None => self.row_displacement(i, active),
             },
@@ -226,45 +227,34 @@ impl ContactPart {
     fn at(&self, i: usize, j: usize) -> DMat3 {
         match &self.columns {
             Columns::All { blocks, stride, .. } => blocks.get(j * stride + i),
-            Columns::Fetched { columns, .. } => columns[j]
-                .get()
+            Columns::Fetched { columns, .. } => columns
+                .get(j)
                 .map_or(DMat3::ZERO, |column| column.blocks.get(i)),
-        }
-    }
-
-    fn bounds(&self, candidate: u32) -> Bounds {
-        match &self.columns {
-            Columns::All { bounds, .. } => bounds[candidate as usize],
-            Columns::Fetched { columns, .. } => {
-                let column = columns[candidate as usize].get();
-                // Without a column it carries no force.
-                column.map_or(
-                    Bounds {
-                        any: 0.0,
-                        other: 0.0,
-                    },
-                    |column| column.bounds,
-                )
-            }
         }
     }
 
     /// Largest Frobenius norm of a 3x3 block of a candidate's column, m/N: no candidate moves by
     /// more than this times the force on it.
     pub(super) fn largest_block(&self, candidate: u32) -> f64 {
-        self.bounds(candidate).any
+        match &self.columns {
+            Columns::All { largest, .. } => largest[candidate as usize],
+            // Without a column it carries no force.
+            Columns::Fetched { columns, .. } => columns
+                .get(candidate as usize)
+                .map_or(0.0, |column| column.largest),
+        }
     }
 
-    /// As [`Self::largest_block`], for all candidates but this one.
-    pub(super) fn largest_other(&self, candidate: u32) -> f64 {
-        self.bounds(candidate).other
+    /// The candidates in clusters of neighbours.
+    pub(super) fn clusters(&self) -> &Clusters {
+        &self.clusters
     }
 
     /// Upper bound on the displacement of any candidate, m.
     pub fn displacement_bound(&self, active: &[ActiveContact]) -> f64 {
         active
             .iter()
-            .map(|c| self.largest_block(c.candidate) * c.normal_force.abs())
+            .map(|c| self.largest_block(c.candidate) * c.force_on_part.length())
             .sum()
     }
 }
@@ -310,8 +300,4 @@ impl ComplianceBlocks for ContactPart {
     fn block(&self, row: usize, col: usize) -> DMat3 {
         self.at(row, col)
     }
-}
-
-fn norm_squared(c: &DMat3) -> f64 {
-    c.to_cols_array().iter().map(|x| x * x).sum()
 }

@@ -48,14 +48,15 @@ impl Stage {
     }
 }
 
-/// A node that carries contact force.
+/// A node that carries contact force: its own, or its share of a force between the nodes of a face.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ActiveContact {
     /// Index among the candidates.
     pub candidate: u32,
-    /// N, along the tool's outward normal, on the part; >= 0.
+    /// N, along the tool's outward normals, on the part: its own, >= 0, and its shares N_a f_n of forces on faces, which
+    /// may be below 0 at the vertex of a curved face. Sums over the nodes to the sum of all normal forces.
     pub normal_force: f64,
-    /// N, part frame: `normal_force` times the normal.
+    /// N, part frame: the same along each normal.
     pub force_on_part: DVec3,
 }
 
@@ -69,14 +70,23 @@ pub struct StepReport {
     pub contact_wrench_on_tool: [f64; 6],
     /// What the virtual coupling exerts on the tool; the handle feels its opposite.
     pub coupling_wrench_on_tool: [f64; 6],
-    /// Nodes that had a plane in the last pass.
+    /// Nodes that had a plane in the last pass, and points of the tool's edges that had a row.
     pub near: u32,
-    /// Nodes that carry force.
+    /// Rows of the last contact problem: fewer than `near` where nodes share rows in patches.
+    pub rows: u32,
+    /// Nodes, and points of the tool's edges, that carry force.
     pub contacts: u32,
-    /// Near nodes left out because memory for more was not reserved.
+    /// Near nodes and points of the tool's edges left out because memory for more was not reserved.
     pub dropped: u32,
     /// Near nodes left out because their column of the compliance is not there yet.
     pub without_column: u32,
+    /// Where nodes share rows: estimate of the resultant's relative error by that, of the last pass (see
+    /// [`contact::patch::Loss`]).
+    pub merge_error: f64,
+    /// m, deepest that a node penetrates its plane after the last pass because it shares a row.
+    pub merged_penetration: f64,
+    /// Whether `merge_error` is above its tolerance.
+    pub merged_badly: bool,
     /// Passes over the contact planes (of the last stride).
     pub passes: u32,
     /// Strides in which a fast handle was followed.
@@ -109,9 +119,13 @@ impl StepReport {
             contact_wrench_on_tool: [0.0; 6],
             coupling_wrench_on_tool: [0.0; 6],
             near: 0,
+            rows: 0,
             contacts: 0,
             dropped: 0,
             without_column: 0,
+            merge_error: 0.0,
+            merged_penetration: 0.0,
+            merged_badly: false,
             passes: 0,
             strides: 0,
             pivots: 0,

@@ -4,7 +4,10 @@ use contact::lcp;
 use contact::plane::Plane;
 use glam::DVec3;
 
+use super::clusters::Clusters;
+use super::edges::Edges;
 use super::pairs::Pairs;
+use super::prune::Prune;
 use super::{ActiveContact, StepReport};
 
 /// Nodes whose compliance blocks are kept side by side: 42 MB of them, touched only as far as they are used.
@@ -12,7 +15,7 @@ const MOST_PAIRS: usize = 768;
 
 #[derive(Debug)]
 pub(super) struct Scratch {
-    /// Planes of this pass; its capacity is the largest number of rows.
+    /// Planes of this pass; its capacity is the largest number of near nodes.
     pub(super) planes: Vec<Plane>,
     /// Planes of nodes that had one earlier in the step and are farther away now.
     pub(super) extra: Vec<Plane>,
@@ -30,6 +33,9 @@ pub(super) struct Scratch {
     pub(super) pairs: Pairs,
     /// Displacement of the planes' nodes before the pass, m.
     pub(super) u_before: Vec<DVec3>,
+    /// Rows that near nodes share where there are more of them.
+    pub(super) prune: Prune,
+    max_rows: usize,
     pub(super) w_matrix: Vec<f64>,
     pub(super) q: Vec<f64>,
     pub(super) z: Vec<f64>,
@@ -39,6 +45,8 @@ pub(super) struct Scratch {
     pub(super) was_active: Vec<bool>,
     /// Contacts that carry force: the state between passes and steps.
     pub(super) active: Vec<ActiveContact>,
+    /// The first of them carry force of a plane of their own.
+    pub(super) n_own: usize,
     lcp: lcp::Scratch,
     /// Contacts set aside while another operator is tried.
     saved: Vec<ActiveContact>,
@@ -47,12 +55,14 @@ pub(super) struct Scratch {
 }
 
 impl Scratch {
-    pub(super) fn new(n_candidates: usize, max_contacts: usize) -> Self {
-        let planes = Vec::with_capacity(max_contacts);
+    /// `max_near`: planes at most; `max_rows`: rows of the contact problem at most.
+    pub(super) fn new(n_candidates: usize, max_near: usize, max_rows: usize) -> Self {
+        let planes = Vec::with_capacity(max_near);
         // Planes are made up to their capacity, which may be more than was asked for.
-        let rows = planes.capacity();
+        let near = planes.capacity();
+        let max_rows = if max_rows == max_near { near } else { max_rows };
         Self {
-            extra: Vec::with_capacity(rows),
+            extra: Vec::with_capacity(near),
             seen: Vec::with_capacity(n_candidates),
             missing: Vec::with_capacity(n_candidates),
             pass_of: vec![0; n_candidates],
@@ -60,25 +70,51 @@ impl Scratch {
             pass: 0,
             stride: 0,
             known: Known::new(n_candidates),
-            pairs: Pairs::new(n_candidates, n_candidates.min(2 * rows).min(MOST_PAIRS)),
-            u_before: Vec::with_capacity(rows),
-            w_matrix: vec![0.0; rows * rows],
-            q: vec![0.0; rows],
-            z: vec![0.0; rows],
-            w: vec![0.0; rows],
-            warm: vec![false; rows],
+            pairs: Pairs::new(n_candidates, n_candidates.min(2 * near).min(MOST_PAIRS)),
+            u_before: Vec::with_capacity(near),
+            prune: Prune::new(n_candidates, near),
+            max_rows,
+            w_matrix: vec![0.0; max_rows * max_rows],
+            q: vec![0.0; near],
+            z: vec![0.0; near],
+            w: vec![0.0; max_rows],
+            warm: vec![false; max_rows],
             was_active: vec![false; n_candidates],
-            active: Vec::with_capacity(rows),
-            lcp: lcp::Scratch::new(rows),
-            saved: Vec::with_capacity(rows),
+            active: Vec::with_capacity(near),
+            n_own: 0,
+            lcp: lcp::Scratch::new(max_rows),
+            saved: Vec::with_capacity(near),
             centres: Vec::with_capacity(n_candidates),
             planes,
         }
     }
 
-    /// Rows of the LCP that there is memory for.
+    /// Rows of the contact problem that there is memory for.
     pub(super) fn max_rows(&self) -> usize {
+        self.max_rows
+    }
+
+    /// Near nodes that there is memory for.
+    pub(super) fn max_near(&self) -> usize {
         self.q.len()
+    }
+
+    /// Rows of the contact problem of these planes, which are put in the order of their patches where they share rows.
+    pub(super) fn gather(&mut self, clusters: &Clusters, length: f64) -> usize {
+        let (active, stride) = (&self.active, self.stride);
+        self.prune.gather(
+            &mut self.planes,
+            self.max_rows,
+            active,
+            clusters,
+            length,
+            stride,
+        )
+    }
+
+    /// Number of the search for equilibrium, from 1.
+    pub(super) fn stride(&self) -> u64 {
+        self.stride
     }
 
     /// Sets the contacts aside.
@@ -97,20 +133,23 @@ impl Scratch {
         for contact in &self.active {
             self.was_active[contact.candidate as usize] = true;
         }
+        self.n_own = self.active.len();
         self.known.forget();
     }
 
     pub(super) fn clear_contacts(&mut self) {
         self.known.forget();
         self.active.clear();
+        self.n_own = 0;
         self.was_active.fill(false);
+        self.prune.clear();
     }
 
     /// Begins a search for equilibrium: only nodes that carry force have had a plane.
     pub(super) fn begin_stride(&mut self) {
         self.stride += 1;
         self.seen.clear();
-        for contact in &self.active {
+        for contact in &self.active[..self.n_own] {
             self.stride_of[contact.candidate as usize] = self.stride;
             self.seen.push(contact.candidate);
         }
@@ -145,10 +184,33 @@ impl Scratch {
         }
     }
 
-    /// Solves `w = q + W z` for the `m` planes, warm-started from the nodes that carried force.
-    pub(super) fn solve(&mut self, m: usize, settings: &lcp::Settings, report: &mut StepReport) {
-        for (warm, plane) in self.warm.iter_mut().zip(&self.planes) {
-            *warm = self.was_active[plane.candidate as usize];
+    /// Solves `w = q + W z` for the `m` rows, those of the planes first, warm-started from the nodes, and the points of
+    /// `edges`, that carried force.
+    pub(super) fn solve(
+        &mut self,
+        m: usize,
+        edges: Option<&Edges>,
+        settings: &lcp::Settings,
+        report: &mut StepReport,
+    ) {
+        let was_active = |plane: &Plane| self.was_active[plane.candidate as usize];
+        match self.prune.patches() {
+            None => {
+                for (warm, plane) in self.warm.iter_mut().zip(&self.planes) {
+                    *warm = was_active(plane);
+                }
+            }
+            Some(patches) => {
+                for (patch, warm) in self.warm.iter_mut().take(m).enumerate() {
+                    *warm = self.planes[patches.range(patch)].iter().any(was_active);
+                }
+            }
+        }
+        if let Some(edges) = edges {
+            let warm = self.warm[self.planes.len()..].iter_mut();
+            for (warm, row) in warm.zip(edges.rows()) {
+                *warm = edges.is_carried(row);
+            }
         }
         let z = &mut self.z[..m];
         let solution = lcp::Problem::trusted_symmetric(&self.w_matrix[..m * m], &self.q[..m])
@@ -178,12 +240,15 @@ impl Scratch {
     }
 
     /// Makes the LCP's answer the contact state. Nodes without a plane carry no force.
-    pub(super) fn adopt_forces(&mut self, m: usize) {
+    pub(super) fn adopt_forces(&mut self) {
+        if let Some(patches) = self.prune.patches() {
+            patches.spread(&mut self.z);
+        }
         for contact in &self.active {
             self.was_active[contact.candidate as usize] = false;
         }
         self.active.clear();
-        for (plane, &z) in self.planes[..m].iter().zip(&self.z) {
+        for (plane, &z) in self.planes.iter().zip(&self.z) {
             if z > 0.0 {
                 self.was_active[plane.candidate as usize] = true;
                 self.active.push(ActiveContact {
@@ -193,6 +258,12 @@ impl Scratch {
                 });
             }
         }
+        self.n_own = self.active.len();
+    }
+
+    /// Makes room for contacts on all candidates, as faces load many for one row.
+    pub(super) fn reserve_contacts(&mut self, n_candidates: usize) {
+        self.active.reserve(n_candidates);
     }
 }
 

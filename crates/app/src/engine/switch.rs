@@ -1,5 +1,7 @@
 //! Switching free nodes without a step of the hand's force: choose, build, ramp.
 
+use glamx::DPose3;
+
 use super::{Engine, Stage, StageClock, StepReport};
 
 /// Largest rise of the blend in one step: a ramp takes 20 steps or more.
@@ -36,14 +38,23 @@ impl Engine {
         };
         let mut clock = StageClock::start();
         let rest = self.part.rest_positions();
+        let state = super::state_of(
+            &self.part,
+            &self.tool,
+            self.last_target.as_ref().unwrap_or(&DPose3::IDENTITY),
+            &self.scratch,
+            Some(constrained),
+        );
+        let near = self.watch.watched(state);
         let scratch = &mut self.scratch;
         scratch.centres.clear();
         let touching = scratch.active.iter().map(|c| rest[c.candidate as usize]);
         scratch.centres.extend(touching);
         if scratch.centres.is_empty() {
             // What will soon touch is freed before it does.
-            let soon = self.watch.watched().iter();
-            scratch.centres.extend(soon.map(|c| rest[*c as usize]));
+            scratch
+                .centres
+                .extend(near.iter().map(|c| rest[*c as usize]));
         }
         let deformed = super::Deformed {
             part: &self.part,
@@ -56,7 +67,6 @@ impl Engine {
             .iter()
             .map(|c| deformed.displacement(c.candidate as usize).length())
             .fold(0.0, f64::max);
-        let near = self.watch.watched();
         constrained.advance(&scratch.centres, near, &scratch.active, largest);
         clock.lap(Stage::FreeNodes, report);
         if constrained.is_ramping() {

@@ -1,46 +1,62 @@
-//! Candidates that are worth evaluating now; each of the others has an appointment.
+//! Candidates that are worth evaluating now; each of the others has an appointment, alone or with its neighbours.
 //!
-//! The engine adds up how far tool and part have moved at most since the start,
+//! For each cluster of neighbouring candidates the engine adds up how far the tool and any node of the cluster have
+//! moved at most since the start,
 //!
 //! ```text
-//! S += |motion of the tool's surface near the part| + Σ_j max_i≠j ‖C_ij‖ |f_j - f_j,then|
+//! S_c += |motion of the tool's surface near the part|
+//!      + Σ_b min( L_cb Σ_j |Δf_j| ,  L_cb |Σ_j Δf_j| + K_cb Σ_j |Δf_j| )       j in cluster b
 //! ```
-//! both of them bounds, not estimates. Any node but those whose own force changes, which are always looked
-//! at, found at a distance d > reach cannot be nearer than `reach` before S has grown by d - reach, because a
-//! signed distance changes by no more than point and surface move: that is when it is looked at again. Those that
-//! are far wait in a heap; those that may come near within some steps are kept in a list of their own. The cost of
-//! a step then goes with the candidates near the tool, not with their number, and no step looks at many at once,
-//! but the first.
-
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+//! (norms L, K between clusters: see [`Clusters`]), all of it bounds, not estimates. A force that wanders from node to
+//! node thus hardly counts far away. Any node but those whose own force changes, which are always looked at, found at
+//! a distance d > reach cannot be nearer than `reach` before S_c has grown by d - reach, because a signed distance
+//! changes by no more than point and surface move: that is when it is looked at again.
+//!
+//! A look goes from cheap to dear. A cluster all of whose nodes are due is judged by its middle node first: where that
+//! is displaced to, less the cluster's radius and what the others may move differently. A node that is due is asked
+//! for its distance where it was seen last, less what forces may have moved it since. Only what still may be near is
+//! handed on to be displaced exactly. The cost of a step then goes with the nodes near the tool; far clusters cost
+//! one sum each.
 
 use contact::tool::Tool;
 use glam::DVec3;
 use glamx::DPose3;
 
 use super::ContactPart;
+use super::clusters::Clusters;
 use super::part::Deformed;
 
 /// Share of a mesh tool's size from which on its box stands in for it: a mesh answers slowly.
 const FAR_SHARE: f64 = 0.25;
 
+/// Nodes of a cluster that are due together from which on the cluster is judged as a whole first: that costs as much
+/// as one exact look, and a distance for each.
+const WHOLE: usize = 3;
+
+/// Units in the last place that a sum grows by in each addition beside what is added, so that what rounding loses is
+/// made up for.
+const ROUNDING: f64 = 2.3e-16;
+
 #[derive(Debug)]
 pub(super) struct Watch {
-    /// How far tool and part have moved at most since the start, m, and what rounding left of it.
-    moved: f64,
-    moved_rest: f64,
-    /// Candidates that are far, by when they may come within [`Self::watch_distance`]; the bits of a positive number
-    /// are in its order.
-    far: BinaryHeap<Reverse<(u64, u32)>>,
-    /// By candidate: its appointment, the key in the heap.
-    far_until: Vec<u64>,
-    watched: Vec<u32>,
-    is_watched: Vec<bool>,
-    /// By candidate that is watched: nearer than reach not before this, m of [`Self::moved`].
+    /// How far the tool has moved at most since the start, m.
+    by_tool: f64,
+    /// By cluster: how far forces have moved any of its nodes at most since the start, m.
+    by_force: Vec<f64>,
+    /// Starts of the sums from nothing.
+    n_starts: u64,
+    /// By cluster: the sum of both at which it is visited again, m. No later than any of its members is due.
+    visit_at: Vec<f64>,
+    /// By place among the members: nearer than reach not before this sum, m.
     due_at: Vec<f64>,
+    /// By place, and of the middle node by cluster: where the node was seen last.
+    seen: Vec<Seen>,
+    middle_seen: Vec<Seen>,
+    /// Clusters to visit in this look.
+    visits: Vec<u32>,
     due: Vec<u32>,
-    /// m, beyond reach: candidates nearer than that are watched.
+    watched: Vec<u32>,
+    /// m, beyond reach: what may come near within some steps.
     slack: f64,
     reach: f64,
     pose_then: Option<DPose3>,
@@ -48,8 +64,50 @@ pub(super) struct Watch {
     force_then: Vec<DVec3>,
     active_then: Vec<u32>,
     switched_then: f64,
+    /// By cluster: what the forces on its members do in this look; zero but for those in `loaded`.
+    loads: Vec<Load>,
+    loaded: Vec<u32>,
     centre: DVec3,
     radius: f64,
+}
+
+/// Forces on the nodes of one cluster.
+#[derive(Debug, Clone, Copy, Default)]
+struct Load {
+    /// N, change since the last look, and the sum of the sizes of its parts.
+    change: DVec3,
+    changes: f64,
+    /// N, sum of the sizes of now.
+    size: f64,
+    is_listed: bool,
+}
+
+/// Where a node was, surely.
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    /// m.
+    at: DVec3,
+    /// m: less [`Watch::by_force`] of now, how far it may be from there.
+    sure_at: f64,
+}
+
+impl Seen {
+    /// Its force has changed: nothing is known.
+    const NEVER: Self = Self {
+        at: DVec3::ZERO,
+        sure_at: f64::NEG_INFINITY,
+    };
+}
+
+/// How far tool and part have moved at most, each sum since the same start. None grows by less than what moved.
+#[derive(Clone, Copy)]
+pub(super) struct Sums<'a> {
+    /// m, of the tool.
+    pub(super) by_tool: f64,
+    /// m, by cluster, of any node but those whose own force changed.
+    pub(super) by_force: &'a [f64],
+    /// Changes when the sums begin anew: what was reckoned with them is void then.
+    pub(super) n_starts: u64,
 }
 
 /// What a look is judged by: the state of now.
@@ -63,7 +121,7 @@ pub(super) struct State<'a> {
 }
 
 impl Watch {
-    /// `reach` (m): candidates nearer than this are wanted. `slack` (m): beyond it, what is watched.
+    /// `reach` (m): candidates nearer than this are wanted. `slack` (m): beyond it, what may come near soon.
     ///
     /// # Errors
     /// Rest positions that are not finite.
@@ -77,81 +135,73 @@ impl Watch {
         }
         let centre = rest.iter().sum::<DVec3>() / rest.len().max(1) as f64;
         let distances = rest.iter().map(|x| (*x - centre).length());
+        let n_clusters = part.clusters().len();
         Ok(Self {
-            moved: 0.0,
-            moved_rest: 0.0,
-            // Twice as many: appointments may be void.
-            far: BinaryHeap::with_capacity(2 * rest.len()),
-            far_until: vec![0; rest.len()],
-            watched: Vec::with_capacity(rest.len()),
-            is_watched: vec![false; rest.len()],
+            by_tool: 0.0,
+            by_force: vec![0.0; n_clusters],
+            n_starts: 0,
+            visit_at: vec![0.0; n_clusters],
             due_at: vec![0.0; rest.len()],
+            seen: vec![Seen::NEVER; rest.len()],
+            middle_seen: vec![Seen::NEVER; n_clusters],
+            visits: Vec::with_capacity(n_clusters),
             due: Vec::with_capacity(rest.len()),
+            watched: Vec::with_capacity(rest.len()),
             slack,
             reach,
             pose_then: None,
             force_then: vec![DVec3::ZERO; rest.len()],
             active_then: Vec::with_capacity(rest.len()),
             switched_then: 0.0,
+            loads: vec![Load::default(); n_clusters],
+            loaded: Vec::with_capacity(n_clusters),
             radius: distances.fold(0.0, f64::max),
             centre,
         })
     }
 
-    /// Candidates that may come near within some steps: those that are near, and more.
-    pub(super) fn watched(&self) -> &[u32] {
-        &self.watched
-    }
-
-    /// Makes the next [`Self::look`] begin anew.
+    /// Makes the next look begin anew.
     pub(super) fn forget(&mut self) {
         self.pose_then = None;
     }
 
-    /// Whether the next [`Self::look`] will ask for the displacement of candidates that are far.
-    pub(super) fn is_far_due(&self, state: State<'_>) -> bool {
-        let Some(then) = self.pose_then else {
-            return true;
+    /// Adds up the motion since the last look. Whether [`Self::look`], which has to follow, will ask for displacements.
+    pub(super) fn advance(&mut self, state: State<'_>) -> bool {
+        let clusters = state.deformed.part.clusters();
+        self.sum_loads(state);
+        match self.pose_then {
+            Some(then) => self.add_motion(&then, state),
+            None => self.begin(),
+        }
+        self.remember(state);
+        self.visits.clear();
+        let by_tool = self.by_tool;
+        let sums = self.by_force.iter().zip(&self.visit_at).enumerate();
+        let is_due = |by_force: f64, at: f64| {
+            // Also where a sum is not a number any more.
+            let is_early = at > by_tool + by_force;
+            !is_early
         };
-        let moved = self.moved + self.motion_bound(&then, state) + self.change_bound(state);
-        let next = self.far.peek();
-        next.is_some_and(|Reverse((at, _))| f64::from_bits(*at) <= moved) || moved.is_nan()
+        self.visits.extend(
+            sums.filter(|(_, (by_force, at))| is_due(**by_force, **at))
+                .map(|(c, _)| c as u32),
+        );
+        self.visits.iter().any(|c| {
+            let due_at = &self.due_at[clusters.range(*c as usize)];
+            self.is_whole(*c as usize, due_at)
+        })
     }
 
     /// Finds the candidates that may be nearer than reach: [`Self::take_due`]. Does not allocate.
     pub(super) fn look(&mut self, state: State<'_>) {
-        // First those that were sent away, so that none is called in twice.
-        let is_watched = &self.is_watched;
-        self.watched.retain(|c| is_watched[*c as usize]);
-        match self.pose_then {
-            Some(then) => {
-                let step = self.motion_bound(&then, state) + self.change_bound(state);
-                self.add_motion(step);
-            }
-            None => self.begin(),
-        }
-        self.remember(state);
-        while let Some(&Reverse((at, candidate))) = self.far.peek() {
-            // Also where the motion is not a number any more.
-            let is_early = f64::from_bits(at) > self.moved;
-            if is_early {
-                break;
-            }
-            self.far.pop();
-            if self.is_watched[candidate as usize] || self.far_until[candidate as usize] != at {
-                // Void: it was called in the meantime.
-                continue;
-            }
-            let distance = distance_bound(state, candidate as usize);
-            self.arrange(candidate, distance);
-        }
-        let (due_at, moved) = (&self.due_at, self.moved);
         self.due.clear();
-        let is_due = |c: &u32| {
-            let is_early = due_at[*c as usize] > moved;
-            !is_early
-        };
-        self.due.extend(self.watched.iter().copied().filter(is_due));
+        for k in 0..self.visits.len() {
+            self.visit(self.visits[k] as usize, state);
+        }
+        for &b in &self.loaded {
+            self.loads[b as usize] = Load::default();
+        }
+        self.loaded.clear();
     }
 
     /// What the last look found, to be given back; each is to be answered with [`Self::postpone`] if it is not
@@ -165,85 +215,264 @@ impl Watch {
         self.due = due;
     }
 
-    /// A candidate that was due is at this distance from the tool, m, beyond reach.
-    pub(super) fn postpone(&mut self, candidate: u32, distance: f64) {
-        let i = candidate as usize;
-        if distance > self.reach + 2.0 * self.slack && self.far.len() < self.far.capacity() {
-            self.send_away(candidate, distance);
-        } else {
-            self.due_at[i] = self.moved + (distance - self.reach);
+    /// A candidate that was due is at this point, at this distance from the tool, m, beyond reach.
+    pub(super) fn postpone(
+        &mut self,
+        clusters: &Clusters,
+        candidate: u32,
+        distance: f64,
+        at: DVec3,
+    ) {
+        let (place, c) = (clusters.place_of(candidate), clusters.cluster_of(candidate));
+        let sure_at = self.by_force[c];
+        self.due_at[place] = self.by_tool + self.by_force[c] + (distance - self.reach);
+        self.seen[place] = Seen { at, sure_at };
+    }
+
+    /// Candidates that may come near within some steps: those that are near, and more.
+    pub(super) fn watched(&mut self, state: State<'_>) -> &[u32] {
+        self.watched.clear();
+        if self.pose_then.is_none() {
+            return &self.watched;
+        }
+        let part = state.deformed.part;
+        let clusters = part.clusters();
+        let is_free = state.deformed.active.is_empty();
+        for c in 0..clusters.len() {
+            let limit = self.by_tool + self.by_force[c] + self.slack;
+            if self.visit_at[c] > limit {
+                continue;
+            }
+            for place in clusters.range(c) {
+                let candidate = clusters.members()[place];
+                // Where nothing is deformed the true distance costs little.
+                let rest = part.rest_positions()[candidate as usize];
+                let is_far = self.due_at[place] > limit
+                    || (is_free && distance_bound(state, rest) > self.reach + self.slack);
+                if !is_far {
+                    self.watched.push(candidate);
+                }
+            }
+        }
+        &self.watched
+    }
+
+    /// Candidates that may be nearer than `distance` (m, at least the reach), by the appointments of the last look;
+    /// replaces `found`.
+    pub(super) fn within(&self, clusters: &Clusters, distance: f64, found: &mut Vec<u32>) {
+        found.clear();
+        for c in 0..clusters.len() {
+            let limit = self.by_tool + self.by_force[c] + (distance - self.reach);
+            // Also what is not a number.
+            let is_beyond = |at: f64| at >= limit;
+            if is_beyond(self.visit_at[c]) {
+                continue;
+            }
+            let members = clusters
+                .range(c)
+                .filter(|place| !is_beyond(self.due_at[*place]));
+            found.extend(members.map(|place| clusters.members()[place]));
         }
     }
 
-    /// A far candidate found at this distance is watched or waits again.
-    fn arrange(&mut self, candidate: u32, distance: f64) {
-        let i = candidate as usize;
-        // Half a slack more, so that it does not come back at once.
-        let is_far = distance > self.reach + 1.5 * self.slack;
-        if is_far {
-            self.send_away(candidate, distance);
+    /// How far tool and part have moved at most since the start.
+    pub(super) fn sums(&self) -> Sums<'_> {
+        Sums {
+            by_tool: self.by_tool,
+            by_force: &self.by_force,
+            n_starts: self.n_starts,
+        }
+    }
+
+    /// Everything is to be looked at now.
+    fn begin(&mut self) {
+        self.n_starts += 1;
+        self.by_tool = 0.0;
+        self.by_force.fill(0.0);
+        self.visit_at.fill(0.0);
+        self.due_at.fill(0.0);
+        self.seen.fill(Seen::NEVER);
+        self.middle_seen.fill(Seen::NEVER);
+    }
+
+    /// Sums up forces and their changes by cluster.
+    fn sum_loads(&mut self, state: State<'_>) {
+        let Deformed { part, active, .. } = state.deformed;
+        let clusters = part.clusters();
+        let (loads, loaded) = (&mut self.loads, &mut self.loaded);
+        let mut add = |candidate: u32, change: DVec3, size: f64| {
+            let b = clusters.cluster_of(candidate);
+            let load = &mut loads[b];
+            if !load.is_listed {
+                load.is_listed = true;
+                loaded.push(b as u32);
+            }
+            load.change += change;
+            load.changes += change.length();
+            load.size += size;
+        };
+        for contact in active {
+            let change = contact.force_on_part - self.force_then[contact.candidate as usize];
+            add(contact.candidate, change, contact.force_on_part.length());
+        }
+        for &candidate in &self.active_then {
+            if !state.is_active[candidate as usize] {
+                add(candidate, -self.force_then[candidate as usize], 0.0);
+            }
+        }
+    }
+
+    /// Adds the motion of tool and part since the last look.
+    fn add_motion(&mut self, then: &DPose3, state: State<'_>) {
+        let clusters = state.deformed.part.clusters();
+        let by_tool = self.motion_bound(then, state);
+        let by_switch = self.switch_bound(state);
+        let changes: f64 = self
+            .loaded
+            .iter()
+            .map(|b| self.loads[*b as usize].changes)
+            .sum();
+        if !(by_tool + by_switch + changes).is_finite() {
+            self.begin();
             return;
         }
-        self.is_watched[i] = true;
-        self.watched.push(candidate);
-        // A distance that is not finite is due now, to be counted where planes are made.
-        self.due_at[i] = self.moved + (distance - self.reach).max(0.0);
-    }
-
-    /// All candidates are to be looked at now.
-    fn begin(&mut self) {
-        (self.moved, self.moved_rest) = (0.0, 0.0);
-        self.watched.clear();
-        self.is_watched.fill(false);
-        self.far.clear();
-        let now = 0.0_f64.to_bits();
-        self.far_until.fill(now);
-        self.far
-            .extend((0..self.is_watched.len() as u32).map(|candidate| Reverse((now, candidate))));
-    }
-
-    /// Adds without losing small steps to a large sum (Kahan).
-    fn add_motion(&mut self, step: f64) {
-        let step = step - self.moved_rest;
-        let sum = self.moved + step;
-        self.moved_rest = (sum - self.moved) - step;
-        self.moved = sum;
+        self.by_tool += by_tool + ROUNDING * self.by_tool;
+        if by_switch > 0.0 {
+            for sum in &mut self.by_force {
+                *sum += by_switch + ROUNDING * *sum;
+            }
+        }
+        for &b in &self.loaded {
+            let Load {
+                change, changes, ..
+            } = self.loads[b as usize];
+            if changes == 0.0 {
+                continue;
+            }
+            let change = change.length();
+            let norms = clusters.largest(b as usize).iter();
+            let norms = norms.zip(clusters.columns(b as usize));
+            for (sum, (largest, columns)) in self.by_force.iter_mut().zip(norms) {
+                let (largest, columns) = (f64::from(*largest), f64::from(*columns));
+                let each = largest * changes;
+                let all = largest * change + columns * changes;
+                let least = if each < all { each } else { all };
+                *sum += least + ROUNDING * *sum;
+            }
+        }
     }
 
     /// Keeps what the next look compares with. Candidates that carry force, or did, are due.
     fn remember(&mut self, state: State<'_>) {
+        let clusters = state.deformed.part.clusters();
         for k in 0..self.active_then.len() {
             let candidate = self.active_then[k];
             self.force_then[candidate as usize] = DVec3::ZERO;
-            self.call(candidate);
+            self.call(clusters, candidate);
         }
         self.active_then.clear();
         for contact in state.deformed.active {
             self.force_then[contact.candidate as usize] = contact.force_on_part;
             self.active_then.push(contact.candidate);
-            self.call(contact.candidate);
+            self.call(clusters, contact.candidate);
         }
         self.pose_then = Some(*state.tool_pose);
         self.switched_then = state.deformed.switched();
     }
 
     /// Makes a candidate due.
-    fn call(&mut self, candidate: u32) {
-        let i = candidate as usize;
-        self.due_at[i] = 0.0;
-        if !self.is_watched[i] {
-            // Its appointment in the heap is void then.
-            self.is_watched[i] = true;
-            self.watched.push(candidate);
-        }
+    fn call(&mut self, clusters: &Clusters, candidate: u32) {
+        let (place, c) = (clusters.place_of(candidate), clusters.cluster_of(candidate));
+        self.due_at[place] = 0.0;
+        self.seen[place] = Seen::NEVER;
+        self.middle_seen[c] = Seen::NEVER;
+        self.visit_at[c] = 0.0;
     }
 
-    /// Sends a candidate away until it may come within the slack.
-    fn send_away(&mut self, candidate: u32, distance: f64) {
-        let at = (self.moved + (distance - self.reach - self.slack)).to_bits();
-        self.far_until[candidate as usize] = at;
-        self.is_watched[candidate as usize] = false;
-        self.far.push(Reverse((at, candidate)));
+    /// Whether a cluster is to be judged by its middle node first. Where forces act that would tell nothing.
+    fn is_whole(&self, c: usize, due_at: &[f64]) -> bool {
+        let sum = self.by_tool + self.by_force[c];
+        let n_early = due_at.iter().filter(|at| **at > sum).count();
+        !self.loads[c].is_listed && due_at.len() - n_early >= WHOLE.min(due_at.len())
+    }
+
+    /// Looks at the members of a cluster that are due.
+    fn visit(&mut self, c: usize, state: State<'_>) {
+        let clusters = state.deformed.part.clusters();
+        let range = clusters.range(c);
+        let sum = self.by_tool + self.by_force[c];
+        if self.is_whole(c, &self.due_at[range.clone()]) && self.judge(c, state) {
+            return;
+        }
+        // Once more in the next look, if any is handed on.
+        let mut next = f64::INFINITY;
+        for place in range {
+            if self.due_at[place] > sum {
+                next = next.min(self.due_at[place]);
+                continue;
+            }
+            let Seen { at, sure_at } = self.seen[place];
+            let doubt = self.by_force[c] - sure_at;
+            if doubt <= self.slack {
+                let beyond = distance_bound(state, at) - doubt - self.reach;
+                if beyond > 0.0 {
+                    self.due_at[place] = sum + beyond;
+                    next = next.min(sum + beyond);
+                    continue;
+                }
+            }
+            self.due.push(clusters.members()[place]);
+            next = 0.0;
+        }
+        self.visit_at[c] = next;
+    }
+
+    /// Whether all members of a cluster are far, by its middle node; their appointments then, and otherwise where they
+    /// surely are.
+    fn judge(&mut self, c: usize, state: State<'_>) -> bool {
+        let Deformed { part, .. } = state.deformed;
+        let (clusters, rest) = (part.clusters(), part.rest_positions());
+        let (radius, middle) = (clusters.radius(c), clusters.middle(c) as usize);
+        let (sum, by_force) = (self.by_tool + self.by_force[c], self.by_force[c]);
+        let mut displacement = None;
+        loop {
+            let Seen { at, sure_at } = self.middle_seen[c];
+            let doubt = by_force - sure_at;
+            if doubt.is_finite() {
+                let beyond = distance_bound(state, at) - radius - doubt - self.reach;
+                if beyond > self.slack {
+                    for at in &mut self.due_at[clusters.range(c)] {
+                        *at = at.max(sum + beyond);
+                    }
+                    self.visit_at[c] = sum + beyond;
+                    return true;
+                }
+            }
+            if displacement.is_some() {
+                break;
+            }
+            let moved = state.deformed.displacement(middle);
+            let load = |b: &u32| self.loads[*b as usize].size;
+            let spread = self.loaded.iter().map(|b| {
+                let norm = clusters.rows(*b as usize)[c];
+                f64::from(norm) * load(b)
+            });
+            displacement = Some(moved);
+            self.middle_seen[c] = Seen {
+                at: rest[middle] + moved,
+                sure_at: by_force - spread.sum::<f64>(),
+            };
+        }
+        let sure_at = self.middle_seen[c].sure_at;
+        for place in clusters.range(c) {
+            let seen = &mut self.seen[place];
+            if seen.sure_at < sure_at {
+                let candidate = clusters.members()[place] as usize;
+                let at = rest[candidate] + displacement.unwrap_or_default();
+                *seen = Seen { at, sure_at };
+            }
+        }
+        false
     }
 
     /// Bound on how far any point of the tool that is near the part has moved, m.
@@ -260,40 +489,22 @@ impl Watch {
         shift + turn * lever
     }
 
-    /// Bound on the change of displacement since the last look, m, of any candidate whose own force has not changed.
-    fn change_bound(&self, state: State<'_>) -> f64 {
-        let Deformed { part, active, .. } = state.deformed;
-        let changed: f64 = active
-            .iter()
-            .map(|c| {
-                let then = self.force_then[c.candidate as usize];
-                part.largest_other(c.candidate) * (c.force_on_part - then).length()
-            })
-            .sum();
-        let gone: f64 = self
-            .active_then
-            .iter()
-            .filter(|c| !state.is_active[**c as usize])
-            .map(|c| part.largest_other(*c) * self.force_then[*c as usize].length())
-            .sum();
-        // The compliance itself changes by no more than all of it while free nodes are switched.
+    /// Bound on how far any candidate was moved by a change of the compliance itself, m: by no more than all of it
+    /// while free nodes are switched.
+    fn switch_bound(&self, state: State<'_>) -> f64 {
         let switched = (state.deformed.switched() - self.switched_then).min(1.0);
-        let by_switch: f64 = if switched > 0.0 {
-            let then = self.active_then.iter();
-            then.map(|c| part.largest_block(*c) * self.force_then[*c as usize].length())
-                .sum::<f64>()
-                * switched
-        } else {
-            0.0
-        };
-        changed + gone + by_switch
+        if switched <= 0.0 {
+            return 0.0;
+        }
+        let part = state.deformed.part;
+        let then = self.active_then.iter();
+        let by_force = then.map(|c| part.largest_block(*c) * self.force_then[*c as usize].length());
+        by_force.sum::<f64>() * switched
     }
 }
 
-/// The distance of a displaced candidate from the tool, or something less, m.
-fn distance_bound(state: State<'_>, candidate: usize) -> f64 {
-    let rest = state.deformed.part.rest_positions()[candidate];
-    let position = rest + state.deformed.displacement(candidate);
+/// Distance of a point from the tool, or something less, m.
+fn distance_bound(state: State<'_>, position: DVec3) -> f64 {
     if let Tool::Mesh(_) | Tool::Field(_) = state.tool
         && let Some((min, max)) = state.tool.aabb(state.tool_pose)
     {
@@ -305,107 +516,9 @@ fn distance_bound(state: State<'_>, candidate: usize) -> f64 {
             return outside;
         }
     }
-    state
-        .tool
-        .signed_distance(state.tool_pose, position)
-        .signed_distance
+    let contact = state.tool.signed_distance(state.tool_pose, position);
+    contact.signed_distance
 }
 
 #[cfg(test)]
-mod tests {
-    use contact::tool::Sphere;
-
-    use super::super::ActiveContact;
-    use super::super::pairs::Pairs;
-    use super::*;
-
-    /// Nodes on a grid, each on its own spring of 1000 N/m; a sphere and forces wander at random.
-    #[test]
-    fn no_near_candidate_is_ever_missed() {
-        let side = 12usize;
-        let rest: Vec<DVec3> = (0..side * side)
-            .map(|k| 1e-3 * DVec3::new((k % side) as f64, (k / side) as f64, 0.0))
-            .collect();
-        let n = rest.len();
-        let mut blocks = vec![0.0; 9 * n * n];
-        for j in 0..n {
-            for c in 0..3 {
-                blocks[9 * (j * n + j) + 4 * c] = 1e-3;
-            }
-        }
-        let part = ContactPart::new(rest, n, blocks);
-        let tool = Tool::Sphere(Sphere::new(3e-3).unwrap());
-        let (reach, slack) = (2e-4, 2e-3);
-        let mut watch = Watch::new(&part, reach, slack).unwrap();
-        let mut seed = 0x1234_5678_u64;
-        let mut random = move || {
-            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            (seed >> 33) as f64 / f64::from(1u32 << 31) - 0.5
-        };
-        let mut pose = DPose3::from_translation(DVec3::new(5e-3, 5e-3, 2.5e-3));
-        let (mut near_seen, mut n_looks) = (0, 0);
-        let mut forces = vec![DVec3::ZERO; n];
-        let pairs = Pairs::new(n, 0);
-        for _ in 0..3000 {
-            pose.translation += 4e-4 * DVec3::new(random(), random(), 0.2 * random());
-            pose.translation = pose
-                .translation
-                .clamp(DVec3::new(0.0, 0.0, 1e-3), DVec3::splat(11e-3));
-            let mut is_active = vec![false; n];
-            let mut active = Vec::new();
-            for candidate in 0..n as u32 {
-                // Few at a time, that come, change and go.
-                let force = &mut forces[candidate as usize];
-                if random() > 0.49 {
-                    *force = if *force == DVec3::ZERO {
-                        DVec3::new(0.1 * random(), 0.1 * random(), random())
-                    } else {
-                        DVec3::ZERO
-                    };
-                }
-                if *force != DVec3::ZERO && candidate % 5 == 0 {
-                    *force += 0.001 * DVec3::new(random(), random(), random());
-                    is_active[candidate as usize] = true;
-                    active.push(ActiveContact {
-                        candidate,
-                        normal_force: force.length(),
-                        force_on_part: *force,
-                    });
-                }
-            }
-            let state = State {
-                deformed: Deformed {
-                    part: &part,
-                    active: &active,
-                    constrained: None,
-                    pairs: &pairs,
-                },
-                tool: &tool,
-                tool_pose: &pose,
-                is_active: &is_active,
-            };
-            watch.look(state);
-            let due = watch.take_due();
-            n_looks += due.len();
-            for candidate in 0..n {
-                let position =
-                    part.rest_positions()[candidate] + part.displacement(candidate, &active);
-                let distance = tool.signed_distance(&pose, position).signed_distance;
-                if distance >= reach {
-                    if due.contains(&(candidate as u32)) {
-                        watch.postpone(candidate as u32, distance);
-                    }
-                } else {
-                    near_seen += 1;
-                    assert!(
-                        due.contains(&(candidate as u32)),
-                        "{candidate} at {position}"
-                    );
-                }
-            }
-            watch.give_back(due);
-        }
-        assert!(near_seen > 1000, "the walk met {near_seen} near nodes only");
-        assert!(n_looks < 3000 * n / 2, "{n_looks} looks spare nothing");
-    }
-}
+mod tests;

@@ -14,7 +14,12 @@ impl Story<'_> {
         let count = |test: &dyn Fn(&Record) -> bool| records.iter().filter(|r| test(r)).count();
         let safety = &self.recording.servo.safety;
         let device = &self.recording.device;
+        let two_rates = self.recording.two_rates.as_ref();
         let all = [
+            (
+                two_rates.map_or(0, |two| two.log.faded),
+                "periods in which the wrench was faded because the engine's result was too old",
+            ),
             (
                 count(&|r| !r.report.converged) as u64,
                 "steps whose contact planes did not come to a stand",
@@ -30,7 +35,12 @@ impl Story<'_> {
             ),
             (
                 count(&|r| r.report.dropped > 0) as u64,
-                "steps with more near nodes than accuracy.max_contacts",
+                "steps with eight times more near nodes than accuracy.max_contacts, or nodes without a distance",
+            ),
+            (
+                count(&|r| r.report.merged_badly) as u64,
+                "steps with near nodes beyond accuracy.max_contacts whose shared rows may be wrong by more than \
+                 accuracy.merge_tolerance",
             ),
             (
                 count(&|r| r.report.switch_forced) as u64,
@@ -155,6 +165,7 @@ impl Story<'_> {
                 ),
             ),
             pair("accuracy", scene.accuracy.words()),
+            pair("rates", self.recording.rates.words()),
             pair(
                 "elements",
                 format!("order {}", self.prepared.loaded.mesh.order),
@@ -208,6 +219,22 @@ impl Story<'_> {
                 .to_owned(),
         ];
         notes.extend(self.picked.clone());
+        if let Some(two) = &self.recording.two_rates {
+            let (median, largest) = two.differences();
+            let times = two.step_us();
+            notes.push(format!(
+                "The force is that of frozen contact problems, solved in every period for the newest pose, with \
+                 differences at hand-overs faded in 4 to 20 ms: {} hand-overs, {median:.1e} N apart by the median and \
+                 {largest:.1e} N at most, up to {} periods old. Whole steps with contact took {:.0} us by the median, \
+                 {:.0} us at most. In {} periods a bound on all motion could not rule out that a node without a plane \
+                 had touched. Pictures show the part under the forces of these problems.",
+                two.log.hand_overs.len(),
+                two.log.max_staleness,
+                times.map_or(0.0, |t| t.p50),
+                times.map_or(0.0, |t| t.max),
+                two.log.beyond_margin,
+            ));
+        }
         let records = &self.recording.records;
         if self.prepared.bubbles.is_some() {
             let most_free = records.iter().map(|r| r.report.free_nodes).max();

@@ -5,6 +5,8 @@
 
 use glam::DVec3;
 
+use super::summary::Percentiles;
+
 /// Number of timed stages in a step; see [`STAGE_NAMES`].
 pub const N_STAGES: usize = 6;
 
@@ -81,6 +83,38 @@ pub struct Facts {
     pub max_principal_strain: f64,
     /// Largest rotation of a material point, degrees.
     pub max_rotation_deg: f64,
+    /// Whether the haptic loop solved whole steps.
+    pub rates: RateFacts,
+}
+
+/// Whether the haptic loop solved whole steps, and what two rates did.
+#[derive(Clone, Debug, Default)]
+pub struct RateFacts {
+    /// Why one or two were chosen.
+    pub why: String,
+    /// What two did; `None` for one.
+    pub two: Option<TwoRateFacts>,
+}
+
+/// What two rates did.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TwoRateFacts {
+    /// Periods after which the engine's results were there; `None`: as soon as they were solved.
+    pub every: Option<u64>,
+    /// Problems that took the place of another.
+    pub hand_overs: u64,
+    /// By how much two problems differed at a hand-over that was felt, N: median.
+    pub difference_median_n: f64,
+    /// The same, N: largest.
+    pub difference_max_n: f64,
+    /// Highest age of the target whose problem was used, periods.
+    pub max_staleness: u64,
+    /// Periods in which a node without a row may have come into contact.
+    pub beyond_margin: u64,
+    /// Periods in which a stale wrench was faded.
+    pub faded: u64,
+    /// The engine's steps with contact, frozen, µs.
+    pub engine_us: Option<Percentiles>,
 }
 
 /// What the hand is doing.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::curve::Curve;
-use super::data::{Run, STAGE_NAMES, StepRow};
+use super::data::{RateFacts, Run, STAGE_NAMES, StepRow};
 
 /// Order statistics of one stage's time, µs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -94,7 +94,48 @@ struct Summary<'a> {
     missed_deadlines: u64,
     step_us: BTreeMap<&'static str, Percentiles>,
     prepare_s: f64,
+    rates: RatesSummary<'a>,
     effects: BTreeMap<&'a str, EffectSummary<'a>>,
+}
+
+#[derive(Serialize)]
+struct RatesSummary<'a> {
+    rates: u32,
+    why: &'a str,
+    two: Option<TwoRatesSummary>,
+}
+
+#[derive(Serialize)]
+#[expect(
+    non_snake_case,
+    reason = "keys of the file carry their unit in its own letters"
+)]
+struct TwoRatesSummary {
+    every: Option<u64>,
+    hand_overs: u64,
+    difference_median_N: f64,
+    difference_max_N: f64,
+    max_staleness_periods: u64,
+    beyond_margin_periods: u64,
+    faded_periods: u64,
+    engine_us: Option<Percentiles>,
+}
+
+fn rates_summary(rates: &RateFacts) -> RatesSummary<'_> {
+    RatesSummary {
+        rates: 1 + u32::from(rates.two.is_some()),
+        why: &rates.why,
+        two: rates.two.map(|two| TwoRatesSummary {
+            every: two.every,
+            hand_overs: two.hand_overs,
+            difference_median_N: two.difference_median_n,
+            difference_max_N: two.difference_max_n,
+            max_staleness_periods: two.max_staleness,
+            beyond_margin_periods: two.beyond_margin,
+            faded_periods: two.faded,
+            engine_us: two.engine_us,
+        }),
+    }
 }
 
 #[derive(Serialize)]
@@ -130,6 +171,7 @@ pub fn json(run: &Run, curve: &Curve) -> String {
         missed_deadlines: facts.missed_deadlines,
         step_us: stage_percentiles(&run.rows).into_iter().collect(),
         prepare_s: facts.prepare_s,
+        rates: rates_summary(&facts.rates),
         effects: run
             .effects
             .iter()
@@ -239,6 +281,7 @@ mod tests {
             "missed_deadlines",
             "step_us",
             "prepare_s",
+            "rates",
             "effects",
         ] {
             assert!(!value[key].is_null(), "{key}");

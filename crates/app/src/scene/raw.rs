@@ -16,7 +16,7 @@ use super::error::{SceneError, line_of, plain, suggestion};
 use super::{DeviceModel, Handle, QuadratureRule, Units};
 pub(super) use accuracy::{
     AccuracyKeys, AccuracyRaw, AdaptiveKeys, AdaptiveRaw, IterationsRaw, MethodRaw, MultiplyRaw,
-    PresetRaw, ScalarRaw,
+    PresetRaw, RatesRaw, ScalarRaw, ToolFeaturesRaw,
 };
 
 /// Values of keys that are not written.
@@ -32,6 +32,7 @@ pub(super) mod default {
     pub(crate) const SERVO_PERIOD: f64 = 1e-3;
     pub(crate) const LCP_TOLERANCE: f64 = 1e-10;
     pub(crate) const MAX_CONTACTS: i64 = 500;
+    pub(crate) const MERGE_TOLERANCE: f64 = 0.05;
     pub(crate) const FRAMES: i64 = 6;
 }
 

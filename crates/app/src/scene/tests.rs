@@ -480,6 +480,24 @@ fn refusals_name_line_key_and_mend() {
             "clip.toml:23: columns \"near\" and adaptive do not go together; leave columns out, or write adaptive = \"off\"",
         ),
         (
+            adding("[accuracy]\nrates = \"two\"\n"),
+            "clip.toml:22: rates has no choice `two`; the nearest is `auto`, all are `auto`, `one`",
+        ),
+        (
+            adding("[accuracy]\nrates = { every = 0 }\n"),
+            "clip.toml:22: rates.every 0 is out of range; write 1 to 50",
+        ),
+        (
+            adding("[accuracy]\nrates = { every = 30 }\n[device]\nservo_period = 2e-3\n"),
+            "clip.toml:22: rates.every 30 periods of 0.002 s are 0.06 s, more than 0.05 s; write 25 or less",
+        ),
+        (
+            adding(
+                "[accuracy]\nadaptive = { method = \"constrain\", radius = 1.0 }\nrates = { every = 2 }\n",
+            ),
+            "clip.toml:23: rates.every does not go with adaptive method \"constrain\"; leave one of the two out, or write method = \"select\"",
+        ),
+        (
             adding("[accuracy]\nmultiply = \"gpu\"\n"),
             "clip.toml:22: multiply \"gpu\" is not in this version; use \"auto\" or \"cpu\"",
         ),
@@ -498,6 +516,10 @@ fn refusals_name_line_key_and_mend() {
         (
             adding("[accuracy]\nmax_contacts = 100000\n"),
             "clip.toml:22: max_contacts 100000 is out of range; write 1 to 5000",
+        ),
+        (
+            adding("[accuracy]\nmerge_tolerance = 5\n"),
+            "clip.toml:22: merge_tolerance 5 is more than all of the force; write a share from above 0 to 1",
         ),
         (
             adding("[device]\nservo_period = 1\n"),

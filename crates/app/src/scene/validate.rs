@@ -41,8 +41,8 @@ pub(super) fn scene(raw: raw::SceneRaw, source: String, path: &Path) -> Result<S
         handle: raw.holds.handle,
         hand: check.hand(&raw.hand, &device)?,
         coupling: check.coupling(&raw.coupling)?,
+        accuracy: check.accuracy(&raw.accuracy.0, device.servo_period)?,
         device,
-        accuracy: check.accuracy(&raw.accuracy.0)?,
         effects: check.effects(&raw.effects)?,
         output: check.output(&raw.output)?,
         handbook: raw

@@ -140,6 +140,12 @@ fn a_spoiled_compliance_fails_its_check() {
         ),
         "{error}"
     );
+    // Wrong on both sides alike, as a copy by symmetry would be.
+    let mut bad = good.clone();
+    bad.blocks[9] += 1e-3 * largest(&good.blocks);
+    bad.blocks[9 * n_rows] += 1e-3 * largest(&good.blocks);
+    let error = bad.check(&solved.stiffness, &solved.factor).unwrap_err();
+    assert!(error.to_string().contains("solved again"), "{error}");
     let mut bad = good;
     bad.blocks.iter_mut().for_each(|v| *v = -*v);
     let error = bad.check(&solved.stiffness, &solved.factor).unwrap_err();

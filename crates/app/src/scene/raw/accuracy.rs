@@ -56,6 +56,68 @@ impl JsonSchema for IterationsRaw {
     }
 }
 
+/// One rate or two.
+#[derive(Debug)]
+pub(in crate::scene) enum RatesRaw {
+    Auto,
+    One,
+    Every(At<i64>),
+}
+
+/// Two rates in full.
+#[derive(Debug, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RatesKeys {
+    every: At<i64>,
+}
+
+impl<'de> Deserialize<'de> for RatesRaw {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Choice;
+        impl<'de> Visitor<'de> for Choice {
+            type Value = RatesRaw;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("\"auto\", \"one\" or a table with every")
+            }
+            fn visit_str<E: de::Error>(self, word: &str) -> Result<RatesRaw, E> {
+                match word {
+                    "auto" => Ok(RatesRaw::Auto),
+                    "one" => Ok(RatesRaw::One),
+                    _ => Err(E::unknown_variant(word, &["auto", "one"])),
+                }
+            }
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<RatesRaw, A::Error> {
+                let keys = RatesKeys::deserialize(MapAccessDeserializer::new(map))?;
+                Ok(RatesRaw::Every(keys.every))
+            }
+        }
+        deserializer.deserialize_any(Choice)
+    }
+}
+
+impl JsonSchema for RatesRaw {
+    fn inline_schema() -> bool {
+        true
+    }
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Rates".into()
+    }
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "x-type": "`\"auto\"`, `\"one\"` or table",
+            "anyOf": [
+                { "enum": ["auto", "one"] },
+                {
+                    "type": "object",
+                    "properties": { "every": { "type": "integer", "minimum": 1, "maximum": 50 } },
+                    "required": ["every"],
+                    "additionalProperties": false
+                }
+            ]
+        })
+    }
+}
+
 /// Number type of a kept compliance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
@@ -76,6 +138,18 @@ pub(in crate::scene) enum MultiplyRaw {
     Cpu,
     /// not in this version.
     Gpu,
+}
+
+/// Whether the tool's corners and edges touch the part between its nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub(in crate::scene) enum ToolFeaturesRaw {
+    /// if the tool has some and the contact groups have faces.
+    Auto,
+    /// or else an error.
+    On,
+    /// contact at the part's nodes only.
+    Off,
 }
 
 /// One word for all settings.
@@ -258,10 +332,29 @@ pub(in crate::scene) struct AccuracyKeys {
     /// this key there is no such budget: the exact answer is found.
     #[schemars(range(min = 1, max = 1000), extend("x-default" = "no budget"))]
     pub(in crate::scene) lcp_rounds: Option<At<i64>>,
-    /// Contact planes in one step, 1 to 5000; beyond it the deepest are kept and the rest is
-    /// counted and reported.
+    /// Rows of the contact problem of one step, 1 to 5000; its time grows with their cube. Where
+    /// more nodes are near, neighbours share a row, up to eight times as many; beyond that the
+    /// deepest are kept and the rest is counted and reported.
     #[schemars(range(min = 1, max = 5000), extend("default" = default::MAX_CONTACTS))]
     pub(in crate::scene) max_contacts: Option<At<i64>>,
+    /// Whether the haptic loop solves the whole step (`"one"`), or the engine runs beside it and hands
+    /// each step's contact problem over, which the loop solves again in every period: `{ every = 5 }`,
+    /// the results being there that many periods later, 1 to 50 and 50 ms at most (where the run waits
+    /// for the real clock: as soon as they are solved). `"auto"`: one; where the run waits for the
+    /// clock, two if 99 % of the steps of a rehearsal do not fit 0.7 of the period. Not with
+    /// `method = "constrain"`.
+    #[schemars(extend("default" = "auto"))]
+    pub(in crate::scene) rates: Option<At<RatesRaw>>,
+    /// Corners and sharp edges of the tool (a box, a cylinder of finite length, a mesh that bends by more than 20 degrees)
+    /// against the part's faces between its nodes: each point of them at a face is one more contact plane, of
+    /// `max_contacts` too. Without it contact acts at nodes only, and what comes between them is not seen. Edges
+    /// are sampled at half the part's smallest face. A step then takes some 0.1 ms on the shipped hook (docs/performance.md). Not with `adaptive`'s method `"constrain"`.
+    #[schemars(extend("default" = "auto"))]
+    pub(in crate::scene) tool_features: Option<At<ToolFeaturesRaw>>,
+    /// Where nodes share rows, relative error of the resultant force above which steps are counted
+    /// and reported, above 0 to 1. It is estimated in each step by the gaps that are left.
+    #[schemars(extend("x-quantity" = "number", "default" = default::MERGE_TOLERANCE))]
+    pub(in crate::scene) merge_tolerance: Option<At<f64>>,
     /// Number type of the displacement multiply; forces are always computed in f64.
     #[schemars(extend("default" = "f64"))]
     pub(in crate::scene) scalar: Option<At<ScalarRaw>>,

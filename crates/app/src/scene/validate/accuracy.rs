@@ -1,18 +1,20 @@
 //! `[accuracy]`: presets resolved, ranges checked, SI.
 
+use super::super::error::line_of;
 use super::super::raw::{
     AccuracyKeys, AdaptiveKeys, AdaptiveRaw, At, IterationsRaw, MethodRaw, MultiplyRaw, PresetRaw,
-    ScalarRaw, default,
+    RatesRaw, ScalarRaw, ToolFeaturesRaw, default,
 };
 use super::super::units::Quantity;
 use super::super::{
-    Accuracy, Adaptive, Columns, ContactIterations, FreeNodes, Multiply, PMethod, Preset, Scalar,
-    SceneError,
+    Accuracy, Adaptive, Columns, ContactIterations, FreeNodes, Multiply, PMethod, Preset, Rates,
+    Scalar, SceneError, ToolFeatures,
 };
 use super::{Check, Range};
 
 impl Check<'_> {
-    pub(super) fn accuracy(&self, raw: &AccuracyKeys) -> Result<Accuracy, SceneError> {
+    /// `period`: of the servo, s.
+    pub(super) fn accuracy(&self, raw: &AccuracyKeys, period: f64) -> Result<Accuracy, SceneError> {
         self.refuse_mixed_budget(raw)?;
         if let Some(at) = raw
             .multiply
@@ -36,16 +38,21 @@ impl Check<'_> {
         let max_contacts = most.map_or(Ok(default::MAX_CONTACTS), |at| {
             self.integer("max_contacts", at, 1, 5000)
         })?;
+        let adaptive = match &raw.adaptive {
+            Some(at) => self.adaptive(at)?,
+            None => base.adaptive,
+        };
         Ok(Accuracy {
             preset,
             budget_us: match &raw.budget_us {
                 Some(at) => Some(self.micros("budget_us", at)?),
                 None => None,
             },
-            adaptive: match &raw.adaptive {
-                Some(at) => self.adaptive(at)?,
-                None => base.adaptive,
+            rates: match &raw.rates {
+                Some(at) => self.rates(at, adaptive, period)?,
+                None => base.rates,
             },
+            adaptive,
             contact_iterations: match &raw.contact_iterations {
                 Some(at) => self.iterations(at)?,
                 None => base.contact_iterations,
@@ -60,6 +67,11 @@ impl Check<'_> {
                 None => None,
             },
             max_contacts: max_contacts as usize,
+            merge_tolerance: match &raw.merge_tolerance {
+                Some(at) => self.merge_tolerance(at)?,
+                None => base.merge_tolerance,
+            },
+            tool_features: self.tool_features(raw)?,
             scalar: scalar(raw.scalar.as_ref()).unwrap_or(base.scalar),
             contact_scalar: scalar(raw.contact_scalar.as_ref()).unwrap_or(base.contact_scalar),
             columns: self.columns(raw, base.adaptive)?,
@@ -130,6 +142,40 @@ impl Check<'_> {
         }
     }
 
+    fn rates(
+        &self,
+        at: &At<RatesRaw>,
+        adaptive: Adaptive,
+        period: f64,
+    ) -> Result<Rates, SceneError> {
+        /// s, after which a result is too old: twice as old, before the next, it would begin to fade.
+        const MOST_DELAY: f64 = 0.05;
+        let every = match &at.value {
+            RatesRaw::Auto => return Ok(Rates::Auto),
+            RatesRaw::One => return Ok(Rates::One),
+            RatesRaw::Every(every) => every,
+        };
+        let periods = self.integer("rates.every", every, 1, 50)? as u32;
+        let most = (MOST_DELAY / period * (1.0 + 1e-9)).floor().max(1.0);
+        if f64::from(periods) > most {
+            let what = format!(
+                "rates.every {periods} periods of {period} s are {} s, more than {MOST_DELAY} s",
+                f64::from(periods) * period
+            );
+            return Err(self.error(every.offset, what, format!("write {most} or less")));
+        }
+        if let Adaptive::On {
+            method: PMethod::Constrain,
+            ..
+        } = adaptive
+        {
+            let what = "rates.every does not go with adaptive method \"constrain\"".to_owned();
+            let mend = "leave one of the two out, or write method = \"select\"";
+            return Err(self.error(at.offset, what, mend));
+        }
+        Ok(Rates::Every(periods))
+    }
+
     fn micros(&self, key: &str, at: &At<f64>) -> Result<f64, SceneError> {
         self.number(key, at, Quantity::Number, Range::Positive)
     }
@@ -151,6 +197,15 @@ impl Check<'_> {
         if !(1e-15..=1e-2).contains(&value) {
             let what = format!("lcp_tolerance {value:e} is not between 1e-15 and 1e-2");
             return Err(self.error(at.offset, what, "1e-10 is safe with 64-bit numbers"));
+        }
+        Ok(value)
+    }
+
+    fn merge_tolerance(&self, at: &At<f64>) -> Result<f64, SceneError> {
+        let value = self.number("merge_tolerance", at, Quantity::Number, Range::Positive)?;
+        if value > 1.0 {
+            let what = format!("merge_tolerance {value} is more than all of the force");
+            return Err(self.error(at.offset, what, "write a share from above 0 to 1"));
         }
         Ok(value)
     }
@@ -197,6 +252,28 @@ impl Check<'_> {
             },
             free,
         })
+    }
+
+    fn tool_features(&self, raw: &AccuracyKeys) -> Result<ToolFeatures, SceneError> {
+        let Some(at) = &raw.tool_features else {
+            return Ok(ToolFeatures::Auto);
+        };
+        let constrain = match raw.adaptive.as_ref().map(|at| &at.value) {
+            Some(AdaptiveRaw::Keys(keys)) => matches!(keys.method, Some(MethodRaw::Constrain)),
+            _ => false,
+        };
+        match at.value {
+            ToolFeaturesRaw::Auto => Ok(ToolFeatures::Auto),
+            ToolFeaturesRaw::Off => Ok(ToolFeatures::Off),
+            ToolFeaturesRaw::On if constrain => Err(self.error(
+                at.offset,
+                "tool_features \"on\" does not go with adaptive's method \"constrain\"".to_owned(),
+                "use method \"select\", which has the same forces as no adaptive, or tool_features \"off\"",
+            )),
+            ToolFeaturesRaw::On => Ok(ToolFeatures::On {
+                line: line_of(self.source, at.offset),
+            }),
+        }
     }
 
     fn radius(&self, at: &At<f64>) -> Result<f64, SceneError> {

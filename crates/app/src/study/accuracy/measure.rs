@@ -1,7 +1,10 @@
 //! One setting, driven along the scene's path: what it computes and how long it takes.
 
+mod two_rates;
+
 use std::time::Instant;
 
+use contact::tool::Tool;
 use device::Wrench;
 use fem::{Hierarchy, Mesh};
 use glam::DVec3;
@@ -9,11 +12,11 @@ use glamx::DPose3;
 use serde::{Deserialize, Serialize};
 
 use super::point::Setting;
-use crate::engine::{Engine, N_STAGES, Stage};
+use crate::engine::{Engine, N_STAGES, Stage, StepReport};
 use crate::prepare::{PrepareOptions, PreparedPart, prepare};
 use crate::progress::Ui;
 use crate::report::summary::Percentiles;
-use crate::scene::{Handle, Scene};
+use crate::scene::{Handle, Rates, Scene};
 use crate::session::part_extent;
 use crate::shape::Shape;
 use crate::{Error, interrupt, setup};
@@ -222,6 +225,41 @@ pub struct Measured {
     pub displacement: Vec<f64>,
 }
 
+impl Measured {
+    fn nothing_yet(prepared: &PreparedPart, n_steps: usize) -> Self {
+        Self {
+            nodes: prepared.loaded.mesh.n_nodes(),
+            elements: prepared.loaded.mesh.n_elements(),
+            order: prepared.loaded.mesh.order as u8,
+            bytes: prepared.bytes(),
+            prepare_s: prepared.total_seconds(),
+            n_timed: 0,
+            step: Times::default(),
+            shape: Times::default(),
+            stages: Vec::new(),
+            free_nodes: 0,
+            contacts: 0,
+            not_converged: 0,
+            certificate: 0.0,
+            switch_change: 0.0,
+            penetration: 0.0,
+            wrench: Vec::with_capacity(n_steps),
+            potential: Vec::with_capacity(n_steps),
+            displacement: Vec::new(),
+        }
+    }
+}
+
+/// J, of the spring between handle and tool.
+fn energy_of_coupling(scene: &Scene, report: &StepReport) -> f64 {
+    let compliance = [
+        1.0 / scene.coupling.translational_stiffness,
+        1.0 / scene.coupling.rotational_stiffness,
+    ];
+    let wrench = report.coupling_wrench_on_tool.iter().enumerate();
+    wrench.map(|(i, w)| 0.5 * w * w * compliance[i / 3]).sum()
+}
+
 /// A part that is prepared, with what is driven.
 pub(super) struct Ready {
     pub(super) prepared: PreparedPart,
@@ -263,6 +301,9 @@ pub(super) fn measure(
     timed_s: Option<f64>,
 ) -> Result<Measured, Error> {
     let timed_s = timed_s.unwrap_or(TIMED_S);
+    if let Rates::Every(every) = scene.accuracy.rates {
+        return two_rates::measure(ready, scene, course, u64::from(every), timed_s);
+    }
     let Ready {
         prepared,
         engine,
@@ -272,26 +313,7 @@ pub(super) fn measure(
     let edges = contact_edges(prepared);
     let mut contact_wrench = Vec::with_capacity(course.targets.len());
     let moments = course.moments();
-    let mut found = Measured {
-        nodes: prepared.loaded.mesh.n_nodes(),
-        elements: prepared.loaded.mesh.n_elements(),
-        order: prepared.loaded.mesh.order as u8,
-        bytes: prepared.bytes(),
-        prepare_s: prepared.total_seconds(),
-        n_timed: 0,
-        step: Times::default(),
-        shape: Times::default(),
-        stages: Vec::new(),
-        free_nodes: 0,
-        contacts: 0,
-        not_converged: 0,
-        certificate: 0.0,
-        switch_change: 0.0,
-        penetration: 0.0,
-        wrench: Vec::with_capacity(course.targets.len()),
-        potential: Vec::with_capacity(course.targets.len()),
-        displacement: Vec::new(),
-    };
+    let mut found = Measured::nothing_yet(prepared, course.targets.len());
 
     // First round: what is computed; it also warms up.
     engine.reset();
@@ -301,16 +323,7 @@ pub(super) fn measure(
         let on_tool = Wrench::from_array(&report.contact_wrench_on_tool);
         let on_handle = on_tool.about(report.tool_pose.translation, target.translation);
         found.wrench.push(on_handle.to_array());
-        let compliance = [
-            1.0 / scene.coupling.translational_stiffness,
-            1.0 / scene.coupling.rotational_stiffness,
-        ];
-        let of_coupling: f64 = report
-            .coupling_wrench_on_tool
-            .iter()
-            .enumerate()
-            .map(|(i, w)| 0.5 * w * w * compliance[i / 3])
-            .sum();
+        let of_coupling = energy_of_coupling(scene, &report);
         let contacts = engine.active_contacts().to_vec();
         let of_part: f64 = contacts
             .iter()
@@ -342,7 +355,9 @@ pub(super) fn measure(
             if interrupt::is_requested() {
                 return Err(Error::Interrupted);
             }
-            let deepest = penetration(engine, &report.tool_pose, &edges);
+            let rest = engine.part().rest_positions().to_vec();
+            let displaced = displaced(&rest, |i| engine.displacement(i));
+            let deepest = penetration(engine.tool(), &displaced, &report.tool_pose, &edges);
             found.penetration = found.penetration.max(deepest);
         }
     }
@@ -402,13 +417,15 @@ fn contact_edges(prepared: &PreparedPart) -> Vec<Vec<usize>> {
     hierarchy.edges().iter().filter_map(of_edge).collect()
 }
 
+/// Places of the candidates, m.
+fn displaced(rest: &[DVec3], mut displacement: impl FnMut(usize) -> DVec3) -> Vec<DVec3> {
+    let places = rest.iter().enumerate();
+    places.map(|(i, x)| *x + displacement(i)).collect()
+}
+
 /// m, how far the deepest candidate, or point between two on an edge, is inside the tool.
-fn penetration(engine: &mut Engine, tool_pose: &DPose3, edges: &[Vec<usize>]) -> f64 {
-    let n = engine.part().n_candidates();
-    let displaced: Vec<DVec3> = (0..n)
-        .map(|i| engine.part().rest_positions()[i] + engine.displacement(i))
-        .collect();
-    let depth = |x: DVec3| -engine.tool().signed_distance(tool_pose, x).signed_distance;
+fn penetration(tool: &Tool, displaced: &[DVec3], tool_pose: &DPose3, edges: &[Vec<usize>]) -> f64 {
+    let depth = |x: DVec3| -tool.signed_distance(tool_pose, x).signed_distance;
     let at_nodes = displaced.iter().map(|x| depth(*x));
     let between = edges.iter().flat_map(|edge| {
         let places: Vec<DVec3> = edge.iter().map(|i| displaced[*i]).collect();

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use crate::report::plot::short;
 use crate::scene::{
-    Accuracy, Adaptive, ContactIterations, FreeNodes, PMethod, Preset, QuadratureRule, Scalar,
-    Scene,
+    Accuracy, Adaptive, ContactIterations, FreeNodes, PMethod, Preset, QuadratureRule, Rates,
+    Scalar, Scene,
 };
 
 /// What is changed along a line of the plots.
@@ -27,6 +27,8 @@ pub enum Axis {
     LcpRounds,
     /// Planes kept in a step.
     MaxContacts,
+    /// Periods after which the results of whole steps are there.
+    Rates,
     /// Number type of the drawn shape.
     Scalar,
     /// Number type of the compliance that the step reads.
@@ -39,7 +41,7 @@ pub enum Axis {
 
 impl Axis {
     /// All, in the order of the tables.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Order,
         Self::Mesh,
         Self::Planes,
@@ -48,6 +50,7 @@ impl Axis {
         Self::LcpTolerance,
         Self::LcpRounds,
         Self::MaxContacts,
+        Self::Rates,
         Self::Scalar,
         Self::ContactScalar,
         Self::Quadrature,
@@ -65,6 +68,7 @@ impl Axis {
             Self::LcpTolerance => "lcp",
             Self::LcpRounds => "lcp-budget",
             Self::MaxContacts => "contacts",
+            Self::Rates => "rates",
             Self::Scalar => "scalar",
             Self::ContactScalar => "contact-scalar",
             Self::Quadrature => "quadrature",
@@ -83,6 +87,7 @@ impl Axis {
             Self::LcpTolerance => "LCP tolerance",
             Self::LcpRounds => "LCP budget",
             Self::MaxContacts => "contacts kept",
+            Self::Rates => "two rates (frozen problems in the loop)",
             Self::Scalar => "numbers of the drawn shape",
             Self::ContactScalar => "numbers of the contact compliance",
             Self::Quadrature => "quadrature",
@@ -97,13 +102,8 @@ impl Axis {
 }
 
 /// A choice that this build or this scene does not have, with the reason.
-pub const NOT_THERE: [(&str, &str); 2] = [
-    ("multiply on the GPU", "this build has the processor's only"),
-    (
-        "two rates",
-        "this build solves the whole step in the haptic loop",
-    ),
-];
+pub const NOT_THERE: [(&str, &str); 1] =
+    [("multiply on the GPU", "this build has the processor's only")];
 
 /// One setting.
 #[derive(Clone, Debug)]
@@ -273,6 +273,24 @@ pub(super) fn points(scene: &Scene, axes: &[Axis], own_order: u8, extent: f64) -
                 for most in [8, 16, 32, 500] {
                     add(format!("{most} planes"), &|s| {
                         s.scene.accuracy.max_contacts = most;
+                    });
+                }
+            }
+            Axis::Rates => {
+                add("one rate".to_owned(), &|s| {
+                    s.scene.accuracy.rates = Rates::One;
+                });
+                // A constrained part has one rate only.
+                let is_constrained = matches!(
+                    scene.accuracy.adaptive,
+                    Adaptive::On {
+                        method: PMethod::Constrain,
+                        ..
+                    }
+                );
+                for every in [2, 5, 10, 20].into_iter().filter(|_| !is_constrained) {
+                    add(format!("results {every} periods later"), &|s| {
+                        s.scene.accuracy.rates = Rates::Every(every);
                     });
                 }
             }

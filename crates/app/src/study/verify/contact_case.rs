@@ -186,6 +186,7 @@ fn engine(
         displacement_tolerance: STANDSTILL,
         near_distance,
         max_contacts: ready.part.n_candidates(),
+        merge_tolerance: 0.0,
         lcp: lcp::Settings::default(),
         max_stride: f64::INFINITY,
     };

@@ -1,0 +1,302 @@
+//! The contact problem of one step, frozen, to be solved again for other targets where whole steps take longer than
+//! a period.
+//!
+//! The rows are those of the step's last pass, and the nodes that may come near before the next step ends. The
+//! operator is kept, and so is its factor: a solve changes it by the rows that come and go, in some m² operations.
+//! What changes is the gaps. They are measured anew, at the places where the last answer has the nodes and the tool:
+//!
+//! ```text
+//! w = g(ξ, u) + W (z - z_last)      u = C f_last      W = H_d C H_dᵀ + H_t K_c⁻¹ H_tᵀ, kept
+//! ```
+//!
+//! so that where solves stand still, they stand at the solution of a whole step (a modified Newton's method). Where
+//! that reads too much of C for a tick, the planes themselves are kept, and move with the target:
+//!
+//! ```text
+//! w = q₀ - H_t (ξ* - ξ*₀) + W z
+//! ```
+//!
+//! which costs m² in all, and leaves out that loaded planes turn as the tool slides over the part: an error of first
+//! order in the way since the step, in force times way over the tool's radius.
+
+mod freeze;
+
+use bytemuck::cast_slice;
+use contact::lcp;
+use contact::plane::{Plane, wrench_on_tool};
+use contact::tool::Tool;
+use device::VirtualCoupling;
+use glam::{DMat3, DVec3};
+use glamx::DPose3;
+
+use super::{ActiveContact, StepReport};
+
+/// Passes in a tick whose gaps are measured, at most; and the change of the wrench, relative, from which on no further
+/// one is made. Each pass leaves a tenth to a third of the change before it.
+const MOST_PASSES: u32 = 4;
+const LEAST_CHANGE: f64 = 1e-4;
+
+/// A frozen contact problem with all memory to make and solve it, sized once.
+#[derive(Debug)]
+pub struct FrozenProblem {
+    /// The step it is from.
+    step: StepReport,
+    target: DPose3,
+    reference: DVec3,
+    coupling: Option<VirtualCoupling>,
+    compliance: Option<[[f64; 6]; 6]>,
+    reach_of_rotation: f64,
+    /// m, that part and tool may move before a node without a row can touch.
+    margin: f64,
+    tool: Tool,
+    /// Passes of a tick at most; with none the planes are kept.
+    most_passes: u32,
+    /// As frozen, or as the last answer has them.
+    planes: Vec<Plane>,
+    /// m, by row, of the node at rest.
+    rest: Vec<DVec3>,
+    /// C between rows, 3x3 column-major inside, block of rows i and j at j m + i; for gaps that are measured.
+    blocks: Vec<f64>,
+    /// h by row, of the frozen planes.
+    tool_rows: Vec<[f64; 6]>,
+    /// m/N by row: no other candidate moves by more than this for a change of the row's force.
+    yields: Vec<f64>,
+    q_frozen: Vec<f64>,
+    w_matrix: Vec<f64>,
+    /// N, by row, on the part, at the step's own target.
+    forces_frozen: Vec<DVec3>,
+    q: Vec<f64>,
+    /// N, by row, of the last answer.
+    forces: Vec<f64>,
+    /// (m, rad), of the tool from its target in the last answer.
+    deviation: [f64; 6],
+    /// On the tool in the last answer.
+    wrench: [f64; 6],
+    gaps: Vec<f64>,
+    active: Vec<ActiveContact>,
+    lcp: lcp::Scratch,
+    settings: lcp::Settings,
+    warm: Vec<bool>,
+    last_tool_pose: DPose3,
+    // What making it needs.
+    candidates: Vec<u32>,
+    is_row: Vec<bool>,
+    extra: Vec<Plane>,
+}
+
+/// Answer of a frozen problem.
+#[derive(Clone, Copy, Debug)]
+pub struct Prediction {
+    /// The report of the step it was frozen from, with pose, wrenches, contacts and certificate of the answer and no
+    /// times.
+    pub report: StepReport,
+    /// Whether no node without a row can have come into contact (a bound, normals held).
+    pub is_within: bool,
+}
+
+impl FrozenProblem {
+    /// Rows of the problem.
+    pub fn n_rows(&self) -> usize {
+        self.planes.len()
+    }
+
+    /// m, that part and tool may move together before a node that has no row can touch.
+    pub fn margin(&self) -> f64 {
+        self.margin
+    }
+
+    /// The target of the step it was frozen from, in the part's frame.
+    pub fn target(&self) -> &DPose3 {
+        &self.target
+    }
+
+    /// Contacts that carry force in the last answer.
+    pub fn active_contacts(&self) -> &[ActiveContact] {
+        &self.active
+    }
+
+    /// Whether gaps are measured anew in every solve, or the planes kept.
+    pub fn is_renewed(&self) -> bool {
+        self.most_passes > 0
+    }
+
+    /// Keeps the planes of the step in the solves that follow, whatever their number.
+    pub fn keep_planes(&mut self) {
+        self.most_passes = 0;
+    }
+
+    /// Equilibrium for a target (part's frame), from the answer before.
+    ///
+    /// Does not allocate, lock, log or block, and reads no clock. A target that is not finite is flagged, and the
+    /// answer is that of the step.
+    pub fn solve(&mut self, target: &DPose3) -> Prediction {
+        if !(target.translation.is_finite() && target.rotation.is_finite()) {
+            let mut report = self.step;
+            report.rejected = true;
+            report.tool_pose = self.last_tool_pose;
+            let is_within = false;
+            return Prediction { report, is_within };
+        }
+        if self.most_passes > 0 {
+            self.solve_renewed(target)
+        } else {
+            self.move_gaps(target);
+            self.answer(target, lcp::Start::Kept)
+        }
+    }
+
+    /// Passes over gaps that are measured, until they change little.
+    fn solve_renewed(&mut self, target: &DPose3) -> Prediction {
+        let mut wrench = self.wrench;
+        let mut pivots = 0;
+        let mut pass = 0;
+        loop {
+            pass += 1;
+            self.measure_gaps(target);
+            let mut answer = self.answer(target, lcp::Start::Kept);
+            pivots += answer.report.pivots;
+            let (change, size) = (0..6)
+                .map(|i| (self.wrench[i] - wrench[i], self.wrench[i]))
+                .fold((0.0, 0.0), |sum: (f64, f64), (d, w)| {
+                    (sum.0 + d * d, sum.1 + w * w)
+                });
+            if pass == self.most_passes || change <= LEAST_CHANGE * LEAST_CHANGE * size {
+                answer.report.passes = pass;
+                answer.report.pivots = pivots;
+                return answer;
+            }
+            wrench = self.wrench;
+        }
+    }
+
+    /// q where the planes move with the target.
+    fn move_gaps(&mut self, target: &DPose3) {
+        let moved = VirtualCoupling::deviation(&self.target, target);
+        let of_rows = self.q_frozen.iter().zip(&self.tool_rows);
+        for (q, (q_frozen, h)) in self.q.iter_mut().zip(of_rows) {
+            *q = q_frozen - dot(h, &moved);
+        }
+    }
+
+    /// Planes and q at the places of the last answer, with the tool as far from this target as from the last.
+    fn measure_gaps(&mut self, target: &DPose3) {
+        let m = self.planes.len();
+        let pose = VirtualCoupling::pose_from_deviation(target, &self.deviation);
+        self.reference = pose.translation;
+        let blocks: &[DMat3] = cast_slice(&self.blocks[..9 * m * m]);
+        // By contact: columns lie side by side. First the places, in the planes' points.
+        for (plane, rest) in self.planes.iter_mut().zip(&self.rest) {
+            plane.point = *rest;
+        }
+        self.q[..m].fill(0.0);
+        for j in 0..m {
+            let force = self.forces[j];
+            if force == 0.0 {
+                continue;
+            }
+            // The normal of the last answer: it is renewed below, after all places are known.
+            let on_part = force * self.planes[j].normal;
+            let columns = blocks[j * m..][..m].iter();
+            let columns = columns.zip(&self.w_matrix[j * m..][..m]);
+            for ((plane, q), (block, w)) in self.planes.iter_mut().zip(&mut self.q).zip(columns) {
+                plane.point += *block * on_part;
+                *q -= w * force;
+            }
+        }
+        for (plane, q) in self.planes.iter_mut().zip(&mut self.q) {
+            let contact = self.tool.signed_distance(&pose, plane.point);
+            // What is not finite shows in the certificate.
+            plane.gap = contact.signed_distance;
+            plane.normal = contact.normal;
+            *q += contact.signed_distance;
+        }
+    }
+
+    fn answer(&mut self, target: &DPose3, start: lcp::Start<'_>) -> Prediction {
+        let m = self.planes.len();
+        let mut report = StepReport {
+            stage_ns: Default::default(),
+            passes: 1,
+            strides: 1,
+            pivots: 0,
+            certificate: 0.0,
+            lcp_solved: true,
+            near: m as u32,
+            ..self.step
+        };
+        let (q, forces) = (&self.q[..m], &mut self.forces[..m]);
+        if q.iter().all(|q| *q >= 0.0) {
+            forces.fill(0.0);
+        } else {
+            let solution =
+                lcp::Problem::trusted_symmetric(&self.w_matrix[..m * m], q).and_then(|problem| {
+                    lcp::solve(
+                        &problem,
+                        &self.settings,
+                        &mut self.lcp,
+                        start,
+                        forces,
+                        &mut self.gaps[..m],
+                    )
+                });
+            match solution {
+                Ok(solution) => {
+                    report.pivots = (solution.rounds + solution.pivots) as u32;
+                    report.certificate = solution.certificate.natural_residual;
+                    report.lcp_solved = solution.status == lcp::Status::Solved;
+                }
+                // Only data that are not finite: no force, and the report says so.
+                Err(_) => {
+                    forces.fill(0.0);
+                    (report.certificate, report.lcp_solved) = (f64::INFINITY, false);
+                }
+            }
+        }
+        self.active.clear();
+        for (plane, &force) in self.planes.iter().zip(&*forces) {
+            if force > 0.0 {
+                self.active.push(ActiveContact {
+                    candidate: plane.candidate,
+                    normal_force: force,
+                    force_on_part: force * plane.normal,
+                });
+            }
+        }
+        report.contacts = self.active.len() as u32;
+        let (force, torque) = wrench_on_tool(&self.planes, forces, self.reference);
+        let wrench = [force.x, force.y, force.z, torque.x, torque.y, torque.z];
+        self.deviation = match &self.compliance {
+            Some(compliance) => compliance.map(|row| dot(&row, &wrench)),
+            None => [0.0; 6],
+        };
+        self.wrench = wrench;
+        report.contact_wrench_on_tool = wrench;
+        report.tool_pose = VirtualCoupling::pose_from_deviation(target, &self.deviation);
+        report.coupling_wrench_on_tool = match &self.coupling {
+            Some(coupling) => {
+                let deviation = VirtualCoupling::deviation(target, &report.tool_pose);
+                coupling.wrench_on_tool(&deviation).to_array()
+            }
+            None => wrench.map(|x| -x),
+        };
+        self.last_tool_pose = report.tool_pose;
+        let of_rows = self.planes.iter().zip(&self.forces[..m]);
+        let by_part: f64 = of_rows
+            .zip(self.forces_frozen.iter().zip(&self.yields))
+            .map(|((plane, force), (then, yields))| {
+                yields * (*force * plane.normal - *then).length()
+            })
+            .sum();
+        let (from, to) = (&self.step.tool_pose, &report.tool_pose);
+        let by_tool = (to.translation - from.translation).length()
+            + self.reach_of_rotation * to.rotation.angle_between(from.rotation);
+        Prediction {
+            report,
+            is_within: by_tool + by_part <= self.margin,
+        }
+    }
+}
+
+fn dot(a: &[f64; 6], b: &[f64; 6]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

@@ -1,0 +1,154 @@
+//! More near nodes than rows: patches of neighbours share a row each, and learn from step to step how.
+//!
+//! The shares in which a patch's nodes carry its force are those of the step before, corrected by the gaps that it
+//! left (one step of Jacobi's method, projected to pushes):
+//!
+//! ```text
+//! ẑ_i = max(0, z_i - α r_i / n_iᵀ C_ii n_i)        r = q + W z
+//! ```
+//! Each node alone changes its own gap most, so that within a patch, whose mean gap the contact problem closes, this
+//! converges: a tool at rest is felt as without patches after some steps. A node that comes near has no share yet,
+//! and patches that change hands change nothing where shares are right: the force stays continuous.
+
+use contact::patch::{Loss, Patches, loss};
+use contact::plane::Plane;
+use glam::DVec3;
+
+use super::ActiveContact;
+use super::clusters::Clusters;
+
+/// α: neighbours add to what a node's own force does, so that a full step would overshoot.
+const DAMPING: f64 = 0.7;
+
+/// Patches of the near nodes where they do not fit the rows, and all memory for them.
+#[derive(Debug)]
+pub(super) struct Prune {
+    pub(super) patches: Patches,
+    is_on: bool,
+    /// q by plane, m; the contact problem has that by patch.
+    q: Vec<f64>,
+    /// Gaps of the planes after the solution, m.
+    gaps: Vec<f64>,
+    /// By candidate: force that it will carry about, N, in this stride; zero but for those in `hinted`.
+    hints: Vec<f64>,
+    hinted: Vec<u32>,
+    hinted_in: u64,
+    /// By plane of the last pass with patches: better forces, N, and the stride that they were found in.
+    better: Vec<f64>,
+    better_of: Vec<u32>,
+    better_in: u64,
+}
+
+impl Prune {
+    pub(super) fn new(n_candidates: usize, max_near: usize) -> Self {
+        Self {
+            patches: Patches::new(max_near),
+            is_on: false,
+            q: Vec::with_capacity(max_near),
+            gaps: Vec::with_capacity(max_near),
+            hints: vec![0.0; n_candidates],
+            hinted: Vec::with_capacity(n_candidates),
+            hinted_in: 0,
+            better: Vec::with_capacity(max_near),
+            better_of: Vec::with_capacity(max_near),
+            better_in: 0,
+        }
+    }
+
+    /// Forgets what was learnt.
+    pub(super) fn clear(&mut self) {
+        (self.hinted_in, self.better_in) = (0, 0);
+    }
+
+    /// The patches of this pass, if there are any.
+    pub(super) fn patches(&self) -> Option<&Patches> {
+        self.is_on.then_some(&self.patches)
+    }
+
+    /// Sorts the planes into patches where they are more than `max_rows`; the number of rows. `stride`: number of the
+    /// search for equilibrium, from 1. `length` (m): what a turn of a normal by one radian is compared with.
+    pub(super) fn gather(
+        &mut self,
+        planes: &mut [Plane],
+        max_rows: usize,
+        active: &[ActiveContact],
+        clusters: &Clusters,
+        length: f64,
+        stride: u64,
+    ) -> usize {
+        self.is_on = planes.len() > max_rows;
+        if !self.is_on {
+            return planes.len();
+        }
+        // Shares stay as they are until the planes stand still.
+        let is_begun = self.hinted_in == stride;
+        if !is_begun {
+            self.hinted_in = stride;
+            self.hint(active, stride);
+        }
+        self.patches.gather(
+            planes,
+            |candidate| clusters.place_of(candidate) as u32,
+            clusters.members().len() as u32,
+            max_rows,
+            length,
+            |candidate| self.hints[candidate as usize],
+            is_begun,
+        );
+        self.patches.len()
+    }
+
+    fn hint(&mut self, active: &[ActiveContact], stride: u64) {
+        for candidate in self.hinted.drain(..) {
+            self.hints[candidate as usize] = 0.0;
+        }
+        if self.better_in != 0 && self.better_in + 1 == stride {
+            for (candidate, force) in self.better_of.iter().zip(&self.better) {
+                self.hints[*candidate as usize] = *force;
+                self.hinted.push(*candidate);
+            }
+        } else {
+            // Until now there were rows enough: these forces are the true ones.
+            for contact in active {
+                self.hints[contact.candidate as usize] = contact.normal_force;
+                self.hinted.push(contact.candidate);
+            }
+        }
+    }
+
+    /// q by plane becomes q by patch.
+    pub(super) fn reduce(&mut self, n_planes: usize, q: &mut [f64]) {
+        self.q.clear();
+        self.q.extend_from_slice(&q[..n_planes]);
+        self.patches.reduce_into(&self.q, q);
+    }
+
+    /// What the solution lost, and better shares for the next stride. `z`: forces of the planes, N; `motion_of`: the
+    /// displacement of a plane's node and how far the tool comes towards it, m; `own_of`: how far a unit force moves
+    /// its own node, m/N.
+    pub(super) fn learn(
+        &mut self,
+        planes: &[Plane],
+        z: &[f64],
+        motion_of: impl Fn(&Plane) -> (DVec3, f64),
+        own_of: impl Fn(&Plane) -> f64,
+        stride: u64,
+    ) -> Loss {
+        self.gaps.clear();
+        self.better.clear();
+        self.better_of.clear();
+        for ((plane, z), q) in planes.iter().zip(z).zip(&self.q) {
+            let (displacement, tool) = motion_of(plane);
+            let gap = q + plane.normal.dot(displacement) - tool;
+            let better = (z - DAMPING * gap / own_of(plane)).max(0.0);
+            self.gaps.push(gap);
+            self.better.push(better);
+            self.better_of.push(plane.candidate);
+        }
+        self.better_in = stride;
+        loss(&z[..planes.len()], &self.better, &self.q, &self.gaps)
+    }
+}
+
+#[cfg(test)]
+mod tests;

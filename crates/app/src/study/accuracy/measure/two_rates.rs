@@ -1,0 +1,100 @@
+//! A setting with two rates, driven along the path: what the loop renders, and how long its ticks take.
+
+use std::time::Instant;
+
+use device::Wrench;
+use glamx::DPose3;
+
+use super::{Course, MOST_ROUNDS, Measured, Ready, Times, contact_edges, displaced};
+use super::{energy_of_coupling, penetration};
+use crate::engine::{N_STAGES, Stage, StepReport};
+use crate::scene::Scene;
+use crate::session::fast::FastSettings;
+use crate::session::part_extent;
+use crate::session::slow::Stepped;
+use crate::{Error, interrupt};
+
+/// As for whole steps, but that the step is a tick, hand-overs included. The drawn shape is that of the engine's last
+/// step, at other moments than those of the reference: it is not compared.
+pub(super) fn measure(
+    ready: &mut Ready,
+    scene: &Scene,
+    course: &Course,
+    every: u64,
+    timed_s: f64,
+) -> Result<Measured, Error> {
+    let Ready {
+        prepared,
+        engine,
+        shape,
+    } = ready;
+    let settings = FastSettings {
+        period_s: scene.device.servo_period,
+        force_resolution: device::Limits::virtuose_6d().force_resolution,
+        lever: part_extent(&prepared.loaded.mesh),
+        n_ticks: course.targets.len(),
+    };
+    let edges = contact_edges(prepared);
+    let moments = course.moments();
+    let mut found = Measured::nothing_yet(prepared, course.targets.len());
+    let (mut ticks, mut drawn) = (Vec::new(), Vec::new());
+    let mut spent = 0.0;
+    for round in 0..MOST_ROUNDS {
+        if round > 0 && spent > timed_s {
+            break;
+        }
+        if interrupt::is_requested() {
+            return Err(Error::Interrupted);
+        }
+        engine.reset();
+        let mut stepped = Stepped::new(engine, &course.targets[0], every, settings)?;
+        for (k, target) in course.targets.iter().enumerate() {
+            let begun = Instant::now();
+            let answer = stepped.tick(k as u64, target, |report| on_handle(report, target));
+            let tick = begun.elapsed();
+            spent += tick.as_secs_f64();
+            if stepped.work(engine, k as u64, target).is_some() {
+                let begun = Instant::now();
+                shape.update(engine)?;
+                drawn.push(begun.elapsed().as_nanos() as u64);
+            }
+            if round > 0 && answer.report.contacts > 0 {
+                ticks.push(tick.as_nanos() as u64);
+            }
+            if round > 0 {
+                continue;
+            }
+            let report = &answer.report;
+            let contacts = stepped.fast().active_contacts();
+            let part = engine.part();
+            let displacement = |i: usize| part.displacement(i, contacts);
+            let of_part = contacts.iter().map(|c| {
+                let u = displacement(c.candidate as usize);
+                0.5 * c.force_on_part.dot(u)
+            });
+            let energy = energy_of_coupling(scene, report) + of_part.sum::<f64>();
+            found.potential.push(energy);
+            found.wrench.push(answer.wrench_on_handle.to_array());
+            found.contacts = found.contacts.max(report.contacts);
+            found.not_converged += usize::from(!report.converged);
+            found.certificate = found.certificate.max(report.certificate);
+            if moments.contains(&k) {
+                let places = displaced(part.rest_positions(), displacement);
+                let deepest = penetration(engine.tool(), &places, &report.tool_pose, &edges);
+                found.penetration = found.penetration.max(deepest);
+            }
+        }
+    }
+    found.n_timed = ticks.len();
+    found.step = Times::of_ns(&ticks);
+    found.shape = Times::of_ns(&drawn);
+    found.stages = vec![Times::default(); N_STAGES];
+    // A tick has no stages of its own.
+    found.stages[Stage::Lcp as usize] = found.step;
+    Ok(found)
+}
+
+fn on_handle(report: &StepReport, target: &DPose3) -> Wrench {
+    let on_tool = Wrench::from_array(&report.contact_wrench_on_tool);
+    on_tool.about(report.tool_pose.translation, target.translation)
+}

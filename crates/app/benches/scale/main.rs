@@ -206,7 +206,7 @@ fn main() {
     .unwrap();
     text += &header("triangles");
     let mut of_triangles = Vec::new();
-    let rings = [8, 24, 72, 224];
+    let rings = [4, 8, 24, 72, 224];
     for rings in rings.into_iter().filter(|_| is_asked("triangles")) {
         let (vertices, triangles) = sphere_mesh(0.03, rings);
         let n = triangles.len();

@@ -53,8 +53,8 @@ pub fn part_spec(scene: &Scene) -> Result<PartSpec, Error> {
         },
         columns: match scene.accuracy.columns {
             scene::Columns::Auto if is_plain => ColumnChoice::Auto,
-            scene::Columns::Auto | scene::Columns::All => ColumnChoice::All,
-            scene::Columns::Near => ColumnChoice::Near,
+            scene::Columns::Near if is_plain => ColumnChoice::Near,
+            _ => ColumnChoice::All,
         },
         contact_scalar: scalar(scene.accuracy.contact_scalar),
         material: Material::new(material.young_modulus, material.poisson_ratio)

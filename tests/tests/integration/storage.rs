@@ -6,9 +6,9 @@ use std::sync::Arc;
 use contact::tool::Tool;
 use glamx::DPose3;
 use snapin::engine::{ContactPart, Engine};
-use snapin::prepare::{PrepareOptions, PreparedCompliance, PreparedPart, prepare};
+use snapin::prepare::{ColumnChoice, PrepareOptions, PreparedCompliance, PreparedPart, prepare};
 use snapin::progress::Ui;
-use snapin::scene::{Columns, Scalar, Scene};
+use snapin::scene::{Adaptive, Columns, FreeNodes, PMethod, Scalar, Scene};
 use snapin::setup;
 use snapin::stored::{Blocks, Source};
 use snapin_tests::{arg, csv, root, snapin};
@@ -196,4 +196,22 @@ fn a_full_store_is_no_error() {
     assert!(few.insert(3, column()));
     assert!(!few.insert(4, column()));
     assert_eq!((few.n_columns(), few.has_column(4)), (1, false));
+}
+
+/// The accuracy study tries the p-method on every scene, also where columns are fetched: it is never left out in silence.
+#[test]
+fn the_p_method_has_all_columns() {
+    let mut scene = Scene::load(&root().join("scenes/clip.toml")).unwrap();
+    scene.accuracy.columns = Columns::Near;
+    assert_eq!(
+        setup::part_spec(&scene).unwrap().columns,
+        ColumnChoice::Near
+    );
+    for method in [PMethod::Select, PMethod::Constrain] {
+        scene.accuracy.adaptive = Adaptive::On {
+            method,
+            free: FreeNodes::Radius(1e-3),
+        };
+        assert_eq!(setup::part_spec(&scene).unwrap().columns, ColumnChoice::All);
+    }
 }

@@ -10,7 +10,7 @@ mod select;
 
 use std::sync::Arc;
 
-use gpu::{Layout, Multiply};
+use gpu::{ComplianceMultiply, Layout};
 
 use crate::Error;
 use crate::engine::Engine;
@@ -30,13 +30,13 @@ pub struct Shape {
 }
 
 enum Kind {
-    Full(Box<dyn Multiply>),
+    Full(Box<dyn ComplianceMultiply>),
     /// From the columns that were fetched.
     Fetched(Arc<Demand>),
     Select(Box<Select>),
     Constrained {
-        coarse: Box<dyn Multiply>,
-        coupling: Box<dyn Multiply>,
+        coarse: Box<dyn ComplianceMultiply>,
+        coupling: Box<dyn ComplianceMultiply>,
         of_bubbles: Vec<f64>,
     },
 }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::error::Error;
 use crate::layout::{Layout, check_length};
-use crate::multiply::{Multiply, Scalar};
+use crate::multiply::{ComplianceMultiply, Scalar, check, check_rows};
 
 /// A number in which the compliance can be kept.
 pub trait Stored: Copy + Default + Send + sealed::Sealed {
@@ -68,6 +68,10 @@ pub struct Cpu<T> {
     columns: Vec<T>,
     /// Power of two; stored number times this is the compliance in m/N.
     unit: f64,
+    /// Of the last call of `begin`.
+    asked_columns: Vec<u32>,
+    asked_forces: Vec<f64>,
+    is_asked: bool,
 }
 
 impl<T: Stored> Cpu<T> {
@@ -102,6 +106,9 @@ impl<T: Stored> Cpu<T> {
             layout,
             columns,
             unit,
+            asked_columns: Vec::with_capacity(layout.n_candidates()),
+            asked_forces: Vec::with_capacity(3 * layout.n_candidates()),
+            is_asked: false,
         })
     }
 
@@ -111,8 +118,8 @@ impl<T: Stored> Cpu<T> {
     }
 }
 
-impl<T: Stored> Multiply for Cpu<T> {
-    fn name(&self) -> &'static str {
+impl<T: Stored> ComplianceMultiply for Cpu<T> {
+    fn name(&self) -> &str {
         T::NAME
     }
 
@@ -130,7 +137,12 @@ impl<T: Stored> Multiply for Cpu<T> {
         forces: &[f64],
         displacement: &mut [f64],
     ) -> Result<(), Error> {
-        self.check(columns, forces, displacement)?;
+        check(self.layout, columns, forces, 1)?;
+        check_length(
+            "displacement",
+            displacement.len(),
+            self.layout.displacement_len(),
+        )?;
         self.multiply_range(columns, forces, 0..self.layout.n_rows(), displacement);
         Ok(())
     }
@@ -143,13 +155,13 @@ impl<T: Stored> Multiply for Cpu<T> {
         rows: &[u32],
         displacement: &mut [f64],
     ) -> Result<(), Error> {
-        self.check(columns, forces, displacement)?;
-        let n_rows = self.layout.n_rows();
-        let largest = rows.iter().map(|r| *r as usize + 1).max().unwrap_or(0);
-        if n_first.max(largest) > n_rows {
-            let row = n_first.max(largest) - 1;
-            return Err(Error::NoSuchRow { row, n_rows });
-        }
+        check(self.layout, columns, forces, 1)?;
+        check_length(
+            "displacement",
+            displacement.len(),
+            self.layout.displacement_len(),
+        )?;
+        check_rows(self.layout, n_first, rows)?;
         self.multiply_range(columns, forces, 0..n_first, displacement);
         // Rows that follow each other are one stretch.
         for run in rows.chunk_by(|a, b| a + 1 == *b) {
@@ -158,26 +170,50 @@ impl<T: Stored> Multiply for Cpu<T> {
         }
         Ok(())
     }
-}
 
-impl<T: Stored> Cpu<T> {
-    fn check(&self, columns: &[u32], forces: &[f64], displacement: &[f64]) -> Result<(), Error> {
-        check_length("forces", forces.len(), 3 * columns.len())?;
+    fn multiply_batch_into(
+        &mut self,
+        n_sets: usize,
+        columns: &[u32],
+        forces: &[f64],
+        displacements: &mut [f64],
+    ) -> Result<(), Error> {
+        check(self.layout, columns, forces, n_sets)?;
+        let n = self.layout.displacement_len();
+        check_length("displacements", displacements.len(), n_sets * n)?;
+        for (set, u) in displacements.chunks_exact_mut(n).enumerate() {
+            let f = &forces[3 * columns.len() * set..3 * columns.len() * (set + 1)];
+            self.multiply_range(columns, f, 0..self.layout.n_rows(), u);
+        }
+        Ok(())
+    }
+
+    fn begin(&mut self, columns: &[u32], forces: &[f64]) -> Result<(), Error> {
+        check(self.layout, columns, forces, 1)?;
+        self.asked_columns.clear();
+        self.asked_columns.extend_from_slice(columns);
+        self.asked_forces.clear();
+        self.asked_forces.extend_from_slice(forces);
+        self.is_asked = true;
+        Ok(())
+    }
+
+    fn newest_into(&mut self, displacement: &mut [f64]) -> Result<bool, Error> {
         check_length(
             "displacement",
             displacement.len(),
             self.layout.displacement_len(),
         )?;
-        let n_candidates = self.layout.n_candidates();
-        match columns.iter().find(|&&c| c as usize >= n_candidates) {
-            Some(&column) => Err(Error::NoSuchColumn {
-                column,
-                n_candidates,
-            }),
-            None => Ok(()),
+        if !std::mem::take(&mut self.is_asked) {
+            return Ok(false);
         }
+        let rows = 0..self.layout.n_rows();
+        self.multiply_range(&self.asked_columns, &self.asked_forces, rows, displacement);
+        Ok(true)
     }
+}
 
+impl<T: Stored> Cpu<T> {
     /// Displacement of a stretch of rows.
     fn multiply_range(
         &self,
@@ -216,7 +252,7 @@ pub fn on_cpu(
     layout: Layout,
     blocks: &[&[f64]],
     scalar: Scalar,
-) -> Result<Box<dyn Multiply>, Error> {
+) -> Result<Box<dyn ComplianceMultiply>, Error> {
     Ok(match scalar {
         Scalar::F32 => Box::new(Cpu::<f32>::new(layout, blocks)?),
         Scalar::F64 => Box::new(Cpu::<f64>::new(layout, blocks)?),

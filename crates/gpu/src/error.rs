@@ -40,6 +40,15 @@ pub enum Error {
         /// Candidate.
         candidate: usize,
     },
+    /// A force is not finite.
+    #[error("the force at contact {contact} of the list is not finite")]
+    ForceNotFinite {
+        /// Place in the list of contacts, through all sets.
+        contact: usize,
+    },
+    /// The surface has no row, so there is nothing to multiply.
+    #[error("the surface has no row: there is nothing to multiply")]
+    NoRows,
     /// The matrix has more numbers than can be addressed.
     #[error("{n_rows} rows by {n_candidates} candidates is more than can be addressed")]
     TooLarge {
@@ -47,5 +56,57 @@ pub enum Error {
         n_rows: usize,
         /// Candidates.
         n_candidates: usize,
+    },
+    /// No graphics adapter is there, or none that may be used.
+    #[error(
+        "no graphics adapter for the multiply: {looked_for}; install a driver for Vulkan, Metal, Direct3D 12 or OpenGL, or use the processor"
+    )]
+    NoAdapter {
+        /// What was looked for, and what was found instead.
+        looked_for: String,
+    },
+    /// The adapter has not the memory for the compliance.
+    #[error("{adapter} has no memory for a compliance of {bytes} bytes: {reason}")]
+    OutOfMemory {
+        /// The adapter.
+        adapter: String,
+        /// Bytes of the stored compliance.
+        bytes: u64,
+        /// What the driver said.
+        reason: String,
+    },
+    /// The device was lost: reset, unplugged, or its driver gone.
+    #[error("{adapter} was lost: {reason}")]
+    DeviceLost {
+        /// The adapter.
+        adapter: String,
+        /// What the driver said.
+        reason: String,
+    },
+    /// The driver, or the layer above it, refused what it was asked for.
+    #[error("{adapter} refused the work: {reason}")]
+    Refused {
+        /// The adapter.
+        adapter: String,
+        /// What it said.
+        reason: String,
+    },
+    /// No answer within the time that a caller waits.
+    #[error("{adapter} gave no answer within {milliseconds} ms")]
+    TimedOut {
+        /// The adapter.
+        adapter: String,
+        /// Waited so long.
+        milliseconds: u64,
+    },
+    /// The adapter's product differs from the processor's by more than rounding explains.
+    #[error(
+        "{adapter} gives a wrong product: {error:.1e} of the largest displacement from the processor's"
+    )]
+    Wrong {
+        /// The adapter.
+        adapter: String,
+        /// Largest difference over the largest displacement.
+        error: f64,
     },
 }

@@ -33,8 +33,11 @@ impl Layout {
     /// Sizes: nodes of the surface and nodes that may be touched.
     ///
     /// # Errors
-    /// Where the matrix could not be addressed.
+    /// Where there is no row, or the matrix could not be addressed.
     pub fn new(n_rows: usize, n_candidates: usize) -> Result<Self, Error> {
+        if n_rows == 0 {
+            return Err(Error::NoRows);
+        }
         let n_bytes = n_rows
             .checked_mul(n_candidates)
             .and_then(|n| n.checked_mul(9 * size_of::<f64>()));
@@ -208,7 +211,8 @@ mod tests {
             Layout::new(1 << 40, 1 << 20),
             Err(Error::TooLarge { .. })
         ));
-        assert!(Layout::new(0, 0).is_ok());
+        assert_eq!(Layout::new(0, 3), Err(Error::NoRows));
+        assert!(Layout::new(3, 0).is_ok());
     }
 
     #[test]

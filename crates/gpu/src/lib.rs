@@ -6,7 +6,7 @@
 //! C is the compliance of the whole surface under unit forces at the candidates (m/N), f the forces (N),
 //! u the displacement of the surface (m). The product reads each number of C once, so what counts is
 //! how much memory is read and in which order. [`Layout`] says where each number lies,
-//! [`Multiply`] is what a back-end offers, [`Cpu`] the back-end on the processor with C kept in 64 or
+//! [`ComplianceMultiply`] is what a back-end offers, [`Cpu`] the back-end on the processor with C kept in 64 or
 //! 32 bits.
 //!
 //! # Example
@@ -15,7 +15,7 @@
 //! axis:
 //!
 //! ```
-//! use gpu::{Layout, Multiply, Scalar, on_cpu};
+//! use gpu::{ComplianceMultiply, Layout, Scalar, on_cpu};
 //!
 //! # fn main() -> Result<(), gpu::Error> {
 //! let layout = Layout::new(2, 1)?;
@@ -46,4 +46,4 @@ mod multiply;
 pub use cpu::{Cpu, Stored, on_cpu};
 pub use error::Error;
 pub use layout::Layout;
-pub use multiply::{Multiply, Scalar};
+pub use multiply::{ComplianceMultiply, Scalar};

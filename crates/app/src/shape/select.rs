@@ -5,7 +5,7 @@ use std::time::Instant;
 use bytemuck::{cast_slice, cast_slice_mut};
 use fem::{Hierarchy, Rule as Following};
 use glam::DVec3;
-use gpu::{Layout, Multiply, Scalar};
+use gpu::{ComplianceMultiply, Layout, Scalar};
 
 use crate::Error;
 use crate::free_nodes::{FreeNodes, Rule};
@@ -25,7 +25,7 @@ const TYPICAL_CONTACTS: usize = 16;
 
 /// Rows with principal nodes first, so that they are multiplied as one stretch.
 pub(super) struct Select {
-    multiply: Box<dyn Multiply>,
+    multiply: Box<dyn ComplianceMultiply>,
     free: FreeNodes,
     n_principal: usize,
     /// Row of the surface, by row of the multiply.
@@ -244,7 +244,7 @@ fn morton_numbers(places: &[[f64; 3]]) -> Vec<u32> {
 /// How many listed rows can be multiplied within `budget_us`, measured here and now, so that the
 /// choice does not depend on the clock later.
 fn affordable_rows(
-    multiply: &mut dyn Multiply,
+    multiply: &mut dyn ComplianceMultiply,
     n_principal: usize,
     budget_us: f64,
 ) -> Result<usize, Error> {

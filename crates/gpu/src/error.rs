@@ -110,3 +110,18 @@ pub enum Error {
         error: f64,
     },
 }
+
+impl Error {
+    /// Whether it is the adapter that failed, rather than what it was given.
+    #[must_use]
+    pub fn is_of_adapter(&self) -> bool {
+        matches!(
+            self,
+            Self::OutOfMemory { .. }
+                | Self::DeviceLost { .. }
+                | Self::Refused { .. }
+                | Self::TimedOut { .. }
+                | Self::Wrong { .. }
+        )
+    }
+}

@@ -124,6 +124,46 @@ impl Layout {
         Ok(())
     }
 
+    /// Refuses blocks of another size, or with a number that is not finite.
+    ///
+    /// # Errors
+    /// Where that is so.
+    pub(crate) fn check_blocks(&self, blocks: &[&[f64]]) -> Result<(), Error> {
+        let found = blocks.iter().map(|stretch| stretch.len()).sum();
+        check_length("blocks", found, self.n_scalars())?;
+        let mut first_row = 0;
+        for stretch in blocks {
+            let n_rows = self.rows_of(stretch)?;
+            if let Some(at) = stretch.iter().position(|x| !x.is_finite()) {
+                let block = at / 9;
+                return Err(Error::NotFinite {
+                    row: first_row + block % n_rows,
+                    candidate: block / n_rows,
+                });
+            }
+            first_row += n_rows;
+        }
+        Ok(())
+    }
+
+    /// The column of a candidate for a force along `axis`, from blocks that were checked.
+    pub(crate) fn column_from_blocks(
+        &self,
+        blocks: &[&[f64]],
+        candidate: usize,
+        axis: usize,
+    ) -> impl Iterator<Item = f64> {
+        let of_row = 9 * self.n_candidates;
+        blocks.iter().flat_map(move |stretch| {
+            let n_rows = stretch.len() / of_row;
+            let first = Self::block_offset(n_rows, 0, candidate);
+            let of_candidate = &stretch[first..first + 9 * n_rows];
+            of_candidate
+                .chunks_exact(9)
+                .flat_map(move |block| block[3 * axis..3 * axis + 3].iter().copied())
+        })
+    }
+
     /// Rows of a stretch of blocks.
     ///
     /// # Errors

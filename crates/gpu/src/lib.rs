@@ -38,12 +38,26 @@
     allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")
 )]
 
+mod adapters;
+mod connection;
 mod cpu;
 mod error;
+mod gpu;
+mod guarded;
 mod layout;
 mod multiply;
+mod plan;
+mod select;
+mod wgpu_backend;
+mod worker;
 
+pub use adapters::{Adapter, Adapters};
+pub use connection::Connection;
 pub use cpu::{Cpu, Stored, on_cpu};
 pub use error::Error;
+pub use gpu::{FRAME, Gpu, GpuSettings};
+pub use guarded::Guarded;
 pub use layout::Layout;
 pub use multiply::{ComplianceMultiply, Scalar};
+pub use plan::Storage;
+pub use select::{Compared, compare};

@@ -1,0 +1,275 @@
+//! The compliance on a device and the passes over it: buffers, pipelines, one submission for each product.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
+use std::time::Duration;
+
+use bytemuck::cast_slice;
+use wgpu::BufferUsages;
+
+use crate::connection::{Connection, READ_ONLY, REDUCE, STORAGE};
+use crate::error::Error;
+use crate::plan::{Job, Kind, Panels, Storage};
+
+/// Threads of a workgroup in the shaders.
+const WORKGROUP: usize = 64;
+
+/// A stretch of columns takes no longer than this to be written.
+const UPLOAD: Duration = Duration::from_secs(30);
+
+/// The compliance on a device.
+pub(crate) struct OnDevice {
+    pub(crate) connection: Connection,
+    panels: Panels,
+    storage: Storage,
+    compliance: Vec<wgpu::Buffer>,
+    /// The number of each panel, as the shader reads it.
+    which: Vec<wgpu::Buffer>,
+    partials: wgpu::Buffer,
+    /// m, 3 for each row; of the last whole product or of the rows that were asked for.
+    pub(crate) displacement: wgpu::Buffer,
+    job: wgpu::Buffer,
+    read_back: wgpu::Buffer,
+    multiply_layout: wgpu::BindGroupLayout,
+    reduce_layout: wgpu::BindGroupLayout,
+    of_panels: Vec<wgpu::BindGroup>,
+    of_reduce: wgpu::BindGroup,
+    whole: wgpu::ComputePipeline,
+    some_rows: wgpu::ComputePipeline,
+    batch: wgpu::ComputePipeline,
+    reduce: wgpu::ComputePipeline,
+}
+
+impl OnDevice {
+    /// Makes buffers and pipelines; the compliance is not there yet.
+    ///
+    /// # Errors
+    /// Where the device refuses, or has not the memory.
+    pub(crate) fn new(
+        connection: Connection,
+        panels: Panels,
+        storage: Storage,
+    ) -> Result<Self, Error> {
+        let c = &connection;
+        let of_candidate = 3 * panels.stride as u64 * storage.bytes();
+        let n_candidates = panels.layout.n_candidates();
+        let bytes = of_candidate * n_candidates as u64;
+        let u = u64::from(u32::BITS / 8);
+        let column = panels.stride as u64 * u;
+        let make = || {
+            let in_storage = BufferUsages::STORAGE | BufferUsages::COPY_DST;
+            let compliance: Vec<_> = (0..panels.n_panels)
+                .map(|panel| {
+                    let size = panels.candidates_of(panel).len() as u64 * of_candidate;
+                    c.buffer("compliance", size, in_storage)
+                })
+                .collect();
+            let which: Vec<_> = (0..panels.n_panels)
+                .map(|_| {
+                    c.buffer(
+                        "panel",
+                        4 * u,
+                        BufferUsages::UNIFORM | BufferUsages::COPY_DST,
+                    )
+                })
+                .collect();
+            for (panel, buffer) in (0_u32..).zip(&which) {
+                c.queue
+                    .write_buffer(buffer, 0, cast_slice(&[panel, 0, 0, 0]));
+            }
+            let partials = panels.room as u64 * column;
+            let partials = c.buffer(
+                "partial sums",
+                partials,
+                in_storage | BufferUsages::COPY_SRC,
+            );
+            // Drawn as vertices where the viewer has the same device.
+            let drawn = in_storage | BufferUsages::COPY_SRC | BufferUsages::VERTEX;
+            let displacement = c.buffer("displacement", column, drawn);
+            let job = c.buffer("job", panels.job_words(1) as u64 * u, in_storage);
+            let to_read = BufferUsages::MAP_READ | BufferUsages::COPY_DST;
+            let read_back = c.buffer("read back", column, to_read);
+            let uniform = wgpu::BufferBindingType::Uniform;
+            let multiply_layout = c.bind_group_layout(&[READ_ONLY, READ_ONLY, STORAGE, uniform]);
+            let reduce_layout = c.bind_group_layout(&[READ_ONLY, READ_ONLY, STORAGE]);
+            let shader = match storage {
+                Storage::F32 => 0,
+                Storage::F16 => 1,
+            };
+            let multiply = |entry| c.pipeline(shader, entry, &multiply_layout);
+            let (whole, some_rows, batch) =
+                (multiply("whole"), multiply("some_rows"), multiply("batch"));
+            let reduce = c.pipeline(REDUCE, "reduce", &reduce_layout);
+            let of_reduce = c.bind(&reduce_layout, &[&job, &partials, &displacement]);
+            Self {
+                connection: connection.clone(),
+                panels,
+                storage,
+                compliance,
+                which,
+                partials,
+                displacement,
+                job,
+                read_back,
+                multiply_layout,
+                reduce_layout,
+                of_panels: Vec::new(),
+                of_reduce,
+                whole,
+                some_rows,
+                batch,
+                reduce,
+            }
+        };
+        let mut made = c.scoped(bytes, make)?;
+        c.scoped(bytes, || made.bind())?;
+        Ok(made)
+    }
+
+    /// Binds the buffers as they are now.
+    fn bind(&mut self) {
+        let Self {
+            connection: c,
+            compliance,
+            which,
+            job,
+            partials,
+            displacement,
+            ..
+        } = self;
+        let of_panel = |(panel, which): (&wgpu::Buffer, &wgpu::Buffer)| {
+            c.bind(&self.multiply_layout, &[panel, job, partials, which])
+        };
+        self.of_panels = compliance.iter().zip(&*which).map(of_panel).collect();
+        self.of_reduce = c.bind(&self.reduce_layout, &[job, partials, displacement]);
+    }
+
+    /// Writes candidates that follow each other, from `first` on: their columns as they are kept.
+    ///
+    /// # Errors
+    /// Where the device refuses or is lost.
+    pub(crate) fn upload(&self, first: usize, columns: &[u8]) -> Result<(), Error> {
+        let c = &self.connection;
+        let of_candidate = 3 * self.panels.stride * self.storage.bytes() as usize;
+        c.scoped(columns.len() as u64, || {
+            for (k, bytes) in columns.chunks_exact(of_candidate).enumerate() {
+                let candidate = first + k;
+                let panel = candidate / self.panels.per_panel;
+                let local = candidate % self.panels.per_panel;
+                let offset = (local * of_candidate) as u64;
+                c.queue.write_buffer(&self.compliance[panel], offset, bytes);
+            }
+        })?;
+        // What waits to be copied does not pile up.
+        let submission = c.queue.submit([]);
+        c.wait(submission, UPLOAD)
+    }
+
+    /// Submits a product. Where it is to be read back, `mapped` tells when its numbers are there.
+    pub(crate) fn submit(&mut self, job: &Job, reads_back: bool) -> Result<Submitted, Error> {
+        self.make_room(job)?;
+        let c = &self.connection;
+        c.queue.write_buffer(&self.job, 0, cast_slice(&job.words));
+        let mut encoder = c
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let bytes = 4 * job.n_out as u64;
+        let source = {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            let groups = |n: usize| n.div_ceil(WORKGROUP) as u32;
+            let fours = groups(self.panels.stride / 4);
+            let (pipeline, x, y) = match job.kind {
+                Kind::Whole => (&self.whole, fours, job.n_slices),
+                Kind::SomeRows => (&self.some_rows, groups(job.n_out), job.n_slices),
+                Kind::Batch(n_sets) => (&self.batch, fours, n_sets.div_ceil(4)),
+            };
+            pass.set_pipeline(pipeline);
+            for panel in &job.panels {
+                pass.set_bind_group(0, &self.of_panels[*panel], &[]);
+                pass.dispatch_workgroups(x, y as u32, 1);
+            }
+            match job.kind {
+                Kind::Batch(_) => &self.partials,
+                Kind::Whole | Kind::SomeRows => {
+                    pass.set_pipeline(&self.reduce);
+                    pass.set_bind_group(0, &self.of_reduce, &[]);
+                    pass.dispatch_workgroups(groups(job.n_out), 1, 1);
+                    &self.displacement
+                }
+            }
+        };
+        let mapped = Arc::new(AtomicU8::new(0));
+        if reads_back && bytes > 0 {
+            encoder.copy_buffer_to_buffer(source, 0, &self.read_back, 0, bytes);
+            let mapped = Arc::clone(&mapped);
+            encoder.map_buffer_on_submit(
+                &self.read_back,
+                wgpu::MapMode::Read,
+                0..bytes,
+                move |result| {
+                    mapped.store(1 + u8::from(result.is_err()), Ordering::Release);
+                },
+            );
+        }
+        let submission = c.queue.submit([encoder.finish()]);
+        c.check()?;
+        Ok(Submitted {
+            submission,
+            mapped,
+            bytes,
+        })
+    }
+
+    /// Waits for a product that is read back and copies its numbers, as they are on the device.
+    pub(crate) fn read(
+        &self,
+        submitted: Submitted,
+        most: Duration,
+        numbers: &mut Vec<f32>,
+    ) -> Result<(), Error> {
+        let c = &self.connection;
+        numbers.clear();
+        c.wait(submitted.submission, most)?;
+        if submitted.bytes == 0 {
+            return Ok(());
+        }
+        let refused = |reason: String| Error::Refused {
+            adapter: c.name.clone(),
+            reason,
+        };
+        if submitted.mapped.load(Ordering::Acquire) != 1 {
+            return Err(refused("the result could not be mapped".to_owned()));
+        }
+        let range = self.read_back.get_mapped_range(0..submitted.bytes);
+        numbers.extend_from_slice(cast_slice(&range.map_err(|e| refused(e.to_string()))?));
+        self.read_back.unmap();
+        Ok(())
+    }
+
+    /// Larger buffers for the first batch; the same ones afterwards.
+    fn make_room(&mut self, job: &Job) -> Result<(), Error> {
+        let (of_job, of_result) = (4 * job.words.capacity() as u64, 4 * job.n_out as u64);
+        if of_job <= self.job.size() && of_result <= self.read_back.size() {
+            return Ok(());
+        }
+        let c = self.connection.clone();
+        let bytes = of_job + of_result;
+        c.scoped(bytes, || {
+            if of_job > self.job.size() {
+                self.job = c.buffer("job", of_job, self.job.usage());
+            }
+            if of_result > self.read_back.size() {
+                self.read_back = c.buffer("read back", of_result, self.read_back.usage());
+            }
+            self.bind();
+        })
+    }
+}
+
+/// A product on its way.
+pub(crate) struct Submitted {
+    submission: wgpu::SubmissionIndex,
+    /// 0 not yet, 1 mapped, 2 failed.
+    mapped: Arc<AtomicU8>,
+    bytes: u64,
+}

@@ -41,6 +41,12 @@ impl Adapter {
         self.info.device_type == wgpu::DeviceType::Cpu
     }
 
+    /// Whether its shaders can unpack 16-bit numbers.
+    pub(crate) fn unpacks_16_bits(&self) -> bool {
+        let flags = self.adapter.get_downlevel_capabilities().flags;
+        flags.contains(wgpu::DownlevelFlags::SHADER_F16_IN_F32)
+    }
+
     /// Bytes that one binding of a shader can reach. A larger compliance is split.
     pub fn binding_limit(&self) -> u64 {
         let limits = self.adapter.limits();
@@ -64,8 +70,8 @@ pub struct Adapters {
 }
 
 impl Adapters {
-    /// Asks the drivers of this machine. The environment variables `WGPU_BACKEND` (`vulkan`, `gl`, ...) and
-    /// `WGPU_ADAPTER_NAME` (part of a name) narrow the search.
+    /// Asks the drivers of this machine: on Linux OpenGL's only in a login session (`XDG_RUNTIME_DIR`). The environment
+    /// variables `WGPU_BACKEND` (`vulkan`, `gl`, ...) and `WGPU_ADAPTER_NAME` (part of a name) choose otherwise.
     pub fn find() -> Self {
         Self::find_within(MOST_MEMORY)
     }
@@ -133,6 +139,11 @@ impl fmt::Display for Adapters {
 fn search(most_memory: u8) -> Adapters {
     let mut asked = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
     asked.memory_budget_thresholds.for_resource_creation = Some(most_memory);
+    let is_set = |name: &str| std::env::var_os(name).is_some();
+    if cfg!(target_os = "linux") && !is_set("XDG_RUNTIME_DIR") && !is_set("WGPU_BACKEND") {
+        // Nobody is logged in; OpenGL then only complains on the error stream, and Vulkan is there without.
+        asked.backends.remove(wgpu::Backends::GL);
+    }
     let backends = asked.backends;
     let instance = wgpu::Instance::new(asked);
     let wanted = std::env::var("WGPU_ADAPTER_NAME").ok();

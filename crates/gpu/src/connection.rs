@@ -26,7 +26,6 @@ pub(crate) const SHADERS: [(&str, &str); 4] = [
     ("copy", include_str!("shaders/copy.wgsl")),
 ];
 pub(crate) const REDUCE: usize = 2;
-#[allow(dead_code, reason = "the bench")]
 pub(crate) const COPY: usize = 3;
 
 /// An open device: its queue, its name, and the first fault that was reported on it.

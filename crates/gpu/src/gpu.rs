@@ -91,6 +91,12 @@ impl Gpu {
         blocks: &[&[f64]],
         settings: GpuSettings,
     ) -> Result<Self, Error> {
+        if settings.storage == Storage::F16 && !adapter.unpacks_16_bits() {
+            return Err(Error::Refused {
+                adapter: adapter.name(),
+                reason: "its shaders cannot unpack 16-bit numbers; use 32 bits".to_owned(),
+            });
+        }
         let opened = adapter.clone();
         let limit = adapter.binding_limit();
         let open = move || Connection::open(&opened);
@@ -201,6 +207,23 @@ impl Gpu {
         self.planner.write(columns, forces, None, &mut self.job);
         let number = self.worker.leave(&mut self.job, Order::Leave)?;
         self.worker.wait(number, self.patience)
+    }
+
+    /// Computes a displacement so many times in one submission and waits for it, without reading back: what a product
+    /// takes on the device itself. For benchmarks.
+    ///
+    /// # Errors
+    /// As [`ComplianceMultiply::multiply_into`].
+    pub fn repeat_on_device(
+        &mut self,
+        times: u32,
+        columns: &[u32],
+        forces: &[f64],
+    ) -> Result<(), Error> {
+        check(self.layout, columns, forces, 1)?;
+        self.planner.write(columns, forces, None, &mut self.job);
+        let number = self.worker.leave(&mut self.job, Order::Repeat(times))?;
+        self.worker.wait(number, crate::worker::PREPARING)
     }
 
     /// Whether a product is not done yet.
@@ -417,3 +440,6 @@ impl ComplianceMultiply for Gpu {
             .take_newest(self.patience, |answer| write(answer, displacement))
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -39,6 +39,7 @@
 )]
 
 mod adapters;
+mod bandwidth;
 mod connection;
 mod cpu;
 mod error;
@@ -52,6 +53,7 @@ mod wgpu_backend;
 mod worker;
 
 pub use adapters::{Adapter, Adapters};
+pub use bandwidth::copy_bandwidth;
 pub use connection::Connection;
 pub use cpu::{Cpu, Stored, on_cpu};
 pub use error::Error;

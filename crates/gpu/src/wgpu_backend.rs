@@ -165,15 +165,25 @@ impl OnDevice {
         c.wait(submission, UPLOAD)
     }
 
-    /// Submits a product. Where it is to be read back, `mapped` tells when its numbers are there.
+    /// Submits a product, to be read back or to stay on the device.
     pub(crate) fn submit(&mut self, job: &Job, reads_back: bool) -> Result<Submitted, Error> {
+        self.submit_repeated(job, 1, reads_back)
+    }
+
+    /// The same, computed so many times.
+    pub(crate) fn submit_repeated(
+        &mut self,
+        job: &Job,
+        times: u32,
+        reads_back: bool,
+    ) -> Result<Submitted, Error> {
         self.make_room(job)?;
         let c = &self.connection;
         c.queue.write_buffer(&self.job, 0, cast_slice(&job.words));
         let mut encoder = c
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let bytes = 4 * job.n_out as u64;
+        let bytes = if reads_back { 4 * job.n_out as u64 } else { 0 };
         let source = {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
             let groups = |n: usize| n.div_ceil(WORKGROUP) as u32;
@@ -183,23 +193,27 @@ impl OnDevice {
                 Kind::SomeRows => (&self.some_rows, groups(job.n_out), job.n_slices),
                 Kind::Batch(n_sets) => (&self.batch, fours, n_sets.div_ceil(4)),
             };
-            pass.set_pipeline(pipeline);
-            for panel in &job.panels {
-                pass.set_bind_group(0, &self.of_panels[*panel], &[]);
-                pass.dispatch_workgroups(x, y as u32, 1);
-            }
-            match job.kind {
-                Kind::Batch(_) => &self.partials,
-                Kind::Whole | Kind::SomeRows => {
+            let reduces = !matches!(job.kind, Kind::Batch(_));
+            for _ in 0..times {
+                pass.set_pipeline(pipeline);
+                for panel in &job.panels {
+                    pass.set_bind_group(0, &self.of_panels[*panel], &[]);
+                    pass.dispatch_workgroups(x, y as u32, 1);
+                }
+                if reduces {
                     pass.set_pipeline(&self.reduce);
                     pass.set_bind_group(0, &self.of_reduce, &[]);
                     pass.dispatch_workgroups(groups(job.n_out), 1, 1);
-                    &self.displacement
                 }
+            }
+            if reduces {
+                &self.displacement
+            } else {
+                &self.partials
             }
         };
         let mapped = Arc::new(AtomicU8::new(0));
-        if reads_back && bytes > 0 {
+        if bytes > 0 {
             encoder.copy_buffer_to_buffer(source, 0, &self.read_back, 0, bytes);
             let mapped = Arc::clone(&mapped);
             encoder.map_buffer_on_submit(
@@ -272,4 +286,24 @@ pub(crate) struct Submitted {
     /// 0 not yet, 1 mapped, 2 failed.
     mapped: Arc<AtomicU8>,
     bytes: u64,
+}
+
+#[cfg(test)]
+impl OnDevice {
+    /// Writes NaN where results go, so that a number that is not written is seen.
+    pub(crate) fn poison(&self) -> Result<(), Error> {
+        let c = &self.connection;
+        for buffer in [&self.partials, &self.displacement] {
+            let numbers = vec![f32::NAN; buffer.size() as usize / 4];
+            c.queue.write_buffer(buffer, 0, cast_slice(&numbers));
+        }
+        c.check()
+    }
+
+    /// Binds a buffer for what it was not made for.
+    pub(crate) fn misuse(&self) -> Result<(), Error> {
+        self.connection
+            .bind(&self.reduce_layout, &[&self.read_back; 3]);
+        self.connection.check()
+    }
 }

@@ -5,6 +5,7 @@
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use crate::connection::Connection;
@@ -18,6 +19,9 @@ const LONGEST: Duration = Duration::from_secs(60);
 /// Opening a device, compiling the shaders, or writing a stretch of columns takes no longer than this.
 pub(crate) const PREPARING: Duration = Duration::from_secs(30);
 
+/// Closing a device takes no longer than this.
+const CLOSING: Duration = Duration::from_secs(2);
+
 /// What the worker is to do with a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Order {
@@ -27,6 +31,8 @@ pub(crate) enum Order {
     Later,
     /// Compute and leave it on the device.
     Leave,
+    /// Compute so many times in one submission and wait for that, without reading back.
+    Repeat(u32),
     /// Write NaN where results go, so that a test sees which numbers are written.
     #[cfg(test)]
     Poison,
@@ -85,6 +91,7 @@ impl Shared {
 /// The caller's end.
 pub(crate) struct Worker {
     shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
     name: String,
     last: u64,
     /// Number of the last job to be taken later, when it was left, and that of the last answer taken.
@@ -157,7 +164,7 @@ impl Preparing {
         let spawned = std::thread::Builder::new()
             .name("snapin-gpu".to_owned())
             .spawn(work);
-        spawned.map_err(|e| Error::Refused {
+        let thread = spawned.map_err(|e| Error::Refused {
             adapter: name.clone(),
             reason: format!("no thread for it: {e}"),
         })?;
@@ -167,6 +174,7 @@ impl Preparing {
             ready,
             worker: Worker {
                 shared,
+                thread: Some(thread),
                 name,
                 last: 0,
                 asked: None,
@@ -258,6 +266,12 @@ impl Worker {
         mailbox.failed.is_none() && mailbox.done < self.last
     }
 
+    /// Whether an order has not been taken yet.
+    #[cfg(test)]
+    pub(crate) fn has_order(&self) -> bool {
+        self.shared.lock().waits.is_some()
+    }
+
     /// Hands the answer of a job that was waited for to `take`.
     pub(crate) fn take(&self, take: impl FnOnce(&Answer)) {
         take(&self.shared.lock().answers[0]);
@@ -290,10 +304,20 @@ impl Worker {
 }
 
 impl Drop for Worker {
-    /// The thread ends by itself, if it can; one that hangs is left behind.
+    /// Waits for the thread, since drivers fail where a device is closed while the program ends; not for one that hangs.
     fn drop(&mut self) {
         self.shared.lock().stops = true;
         self.shared.to_worker.notify_one();
+        let begun = Instant::now();
+        while let Some(thread) = self.thread.take_if(|_| begun.elapsed() < CLOSING) {
+            if thread.is_finished() {
+                // A panic has been told as a failure already.
+                let _ = thread.join();
+            } else {
+                self.thread = Some(thread);
+                std::thread::sleep(Duration::from_micros(100));
+            }
+        }
     }
 }
 
@@ -353,6 +377,10 @@ fn obey(
             device.read(submitted, LONGEST, numbers)
         }
         Order::Leave => device.submit(job, false).map(|_| ()),
+        Order::Repeat(times) => {
+            let submitted = device.submit_repeated(job, times, false)?;
+            device.read(submitted, LONGEST, numbers)
+        }
         #[cfg(test)]
         Order::Poison => device.poison(),
         #[cfg(test)]

@@ -1,5 +1,5 @@
-// Storage of the compliance in 16 bits: four numbers in 8 bytes. Unpacking is part of every WGSL, so no feature of
-// the adapter is asked for.
+// Storage of the compliance in 16 bits: four numbers in 8 bytes. They are unpacked by a function of every WGSL; 16-bit
+// arithmetic, which few adapters offer, is not asked for.
 
 @group(0) @binding(0) var<storage, read> compliance: array<vec2<u32>>;
 

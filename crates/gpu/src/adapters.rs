@@ -70,8 +70,8 @@ pub struct Adapters {
 }
 
 impl Adapters {
-    /// Asks the drivers of this machine: on Linux OpenGL's only in a login session (`XDG_RUNTIME_DIR`). The environment
-    /// variables `WGPU_BACKEND` (`vulkan`, `gl`, ...) and `WGPU_ADAPTER_NAME` (part of a name) choose otherwise.
+    /// Asks the drivers of this machine. The environment variables `WGPU_BACKEND` (`vulkan`, `gl`, ...) and
+    /// `WGPU_ADAPTER_NAME` (part of a name) narrow the search.
     pub fn find() -> Self {
         Self::find_within(MOST_MEMORY)
     }
@@ -139,11 +139,6 @@ impl fmt::Display for Adapters {
 fn search(most_memory: u8) -> Adapters {
     let mut asked = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
     asked.memory_budget_thresholds.for_resource_creation = Some(most_memory);
-    let is_set = |name: &str| std::env::var_os(name).is_some();
-    if cfg!(target_os = "linux") && !is_set("XDG_RUNTIME_DIR") && !is_set("WGPU_BACKEND") {
-        // Nobody is logged in; OpenGL then only complains on the error stream, and Vulkan is there without.
-        asked.backends.remove(wgpu::Backends::GL);
-    }
     let backends = asked.backends;
     let instance = wgpu::Instance::new(asked);
     let wanted = std::env::var("WGPU_ADAPTER_NAME").ok();

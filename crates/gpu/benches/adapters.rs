@@ -23,7 +23,7 @@ use gpu::{
     copy_bandwidth, on_cpu,
 };
 
-/// Rows and candidates; 1 MB to 1.6 GB in 32 bits. A software adapter gets those of at most 330 MB, which is beyond
+/// Rows and candidates; 1 MB to 1.6 GB in 32 bits. A software adapter gets those of at most 170 MB, which is beyond
 /// what it binds at once.
 const SIZES: [(usize, usize); 6] = [
     (200, 140),
@@ -33,9 +33,10 @@ const SIZES: [(usize, usize); 6] = [
     (20_000, 1000),
     (30_000, 1500),
 ];
-const MOST_BYTES_OF_SOFTWARE: usize = 330_000_000;
+const MOST_BYTES_OF_SOFTWARE: usize = 170_000_000;
 
 const CONTACTS: [usize; 5] = [5, 15, 62, 250, 500];
+const CONTACTS_OF_SOFTWARE: [usize; 3] = [5, 62, 500];
 
 /// Products that are timed one by one; fewer where one takes long.
 const CALLS: usize = 31;
@@ -76,6 +77,14 @@ struct Line {
     processor: f64,
 }
 
+fn contacts_of(adapter: &Adapter) -> &'static [usize] {
+    if adapter.is_software() {
+        &CONTACTS_OF_SOFTWARE
+    } else {
+        &CONTACTS
+    }
+}
+
 fn measure(adapter: &Adapter, lines: &mut Vec<Line>) -> Result<(), Error> {
     for (n_rows, n_candidates) in SIZES {
         let layout = Layout::new(n_rows, n_candidates)?;
@@ -95,7 +104,10 @@ fn measure(adapter: &Adapter, lines: &mut Vec<Line>) -> Result<(), Error> {
             let mut gpu = Gpu::new(adapter, layout, &[&blocks], settings)?;
             let bytes = gpu.bytes() as f64;
             let copy = copy_bandwidth(adapter, bytes as u64)?;
-            for contacts in CONTACTS.into_iter().filter(|n| *n <= n_candidates) {
+            for contacts in contacts_of(adapter).iter().copied() {
+                if contacts > n_candidates {
+                    continue;
+                }
                 let forces = vec![1.0; 3 * contacts];
                 let columns = |call| columns_of(call, contacts, n_candidates);
                 // As many in one submission as make submitting a small part, and no more than a second.
@@ -124,9 +136,9 @@ fn measure(adapter: &Adapter, lines: &mut Vec<Line>) -> Result<(), Error> {
 }
 
 /// From which size on the round trip is faster than the processor, for each number of contacts.
-fn break_even(lines: &[Line]) -> String {
+fn break_even(lines: &[Line], contacts: &[usize]) -> String {
     let mut text = String::new();
-    for contacts in CONTACTS {
+    for contacts in contacts.iter().copied() {
         let mut of_count: Vec<&Line> = lines
             .iter()
             .filter(|line| line.contacts == contacts && line.storage == Storage::F32)
@@ -182,7 +194,7 @@ fn table(adapter: &Adapter) -> String {
     if let Err(error) = measured {
         let _ = writeln!(text, "\nEnded early: {error}.");
     }
-    let even = break_even(&lines);
+    let even = break_even(&lines, contacts_of(adapter));
     let _ = write!(
         text,
         "\nThe round trip is faster than one core (f32):\n\n{even}\n"

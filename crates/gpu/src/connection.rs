@@ -263,3 +263,32 @@ pub(crate) const STORAGE: wgpu::BufferBindingType =
     wgpu::BufferBindingType::Storage { read_only: false };
 pub(crate) const READ_ONLY: wgpu::BufferBindingType =
     wgpu::BufferBindingType::Storage { read_only: true };
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_of_the_driver_are_told_apart_in_one_line() {
+        let memory = wgpu::Error::OutOfMemory {
+            source: "heap".into(),
+        };
+        let memory = named("adapter", &memory, 7);
+        assert!(matches!(memory, Error::OutOfMemory { bytes: 7, .. }));
+        assert!(
+            memory
+                .to_string()
+                .contains("no memory for a compliance of 7 bytes")
+        );
+        let validation = wgpu::Error::Validation {
+            source: "cause".into(),
+            description: "a\n  b".to_owned(),
+        };
+        let refused = named("adapter", &validation, 7).to_string();
+        assert!(
+            refused.starts_with("adapter refused the work: "),
+            "{refused}"
+        );
+        assert!(refused.ends_with("a b"), "{refused}");
+    }
+}

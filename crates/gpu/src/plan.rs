@@ -354,3 +354,97 @@ pub(crate) fn power_of_two_below(value: f64) -> f64 {
     // The exponent bits alone.
     f64::from_bits(value.to_bits() & (0x7ff << 52))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn panels_hold_each_candidate_once_and_none_is_larger_than_a_binding() {
+        for (n_rows, n_candidates, limit) in
+            [(1, 1, 64), (5, 7, 300), (21, 100, 5000), (64, 9, 1 << 27)]
+        {
+            let layout = Layout::new(n_rows, n_candidates).unwrap();
+            for storage in [Storage::F32, Storage::F16] {
+                let panels = Panels::new(layout, storage, limit).unwrap();
+                let of_candidate = 3 * panels.stride as u64 * storage.bytes();
+                let mut next = 0;
+                for panel in 0..panels.n_panels {
+                    let candidates = panels.candidates_of(panel);
+                    assert_eq!(candidates.start, next);
+                    assert!(!candidates.is_empty());
+                    assert!(candidates.len() as u64 * of_candidate <= limit);
+                    next = candidates.end;
+                }
+                assert_eq!(next, n_candidates);
+                assert!(panels.room as u64 * panels.stride as u64 * 4 <= limit);
+            }
+        }
+        let layout = Layout::new(1000, 1).unwrap();
+        let refused = Panels::new(layout, Storage::F32, 3000 * 12 - 1);
+        assert!(matches!(refused, Err(Error::TooLarge { .. })));
+    }
+
+    #[test]
+    fn job_lists_each_candidate_once_with_the_sum_of_its_forces() {
+        let layout = Layout::new(4, 3).unwrap();
+        let panels = Panels::new(layout, Storage::F32, 1 << 20).unwrap();
+        let mut planner = Planner::new(panels, vec![0.25; 9], true);
+        let mut job = Job::empty(&panels, 1);
+        planner.write(
+            &[2, 0, 2],
+            &[1.0, 2.0, 3.0, 0.5, 0.0, 0.0, 1.0, 1.0, 1.0],
+            None,
+            &mut job,
+        );
+        let entry = |k: usize| {
+            let words = &job.words[12 + 4 * k..16 + 4 * k];
+            let force = |word: &u32| f64::from(f32::from_bits(*word));
+            (
+                words[0],
+                [force(&words[1]), force(&words[2]), force(&words[3])],
+            )
+        };
+        // The largest, 4 N times 0.25, is 1 already.
+        assert_eq!(entry(0), (2, [0.5, 0.75, 1.0]));
+        assert_eq!(entry(1), (0, [0.125, 0.0, 0.0]));
+        assert_eq!(job.words.len(), 20);
+        assert_eq!(
+            (job.n_out, job.n_slices, job.panels.as_slice()),
+            (12, 1, &[0][..])
+        );
+
+        planner.write(&[], &[], None, &mut job);
+        assert_eq!(
+            (job.n_slices, job.panels.len(), job.words.len()),
+            (0, 0, 12)
+        );
+    }
+
+    #[test]
+    fn many_entries_are_cut_into_slices_where_there_are_threads_for_them() {
+        let layout = Layout::new(100, 400).unwrap();
+        let panels = Panels::new(layout, Storage::F32, 1 << 30).unwrap();
+        let columns: Vec<u32> = (0..400).collect();
+        let slices = |n: usize, is_software: bool| {
+            let mut planner = Planner::new(panels, vec![1.0; 1200], is_software);
+            let mut job = Job::empty(&panels, 1);
+            planner.write(&columns[..n], &vec![1.0; 3 * n], None, &mut job);
+            // All entries are in one of the slices.
+            let of_slice = job.words[8 + 2] as usize;
+            assert!(job.n_slices * of_slice >= n);
+            job.n_slices
+        };
+        assert_eq!((slices(400, true), slices(400, false)), (1, 32));
+        assert_eq!((slices(3, false), slices(13, false)), (1, 4));
+    }
+
+    #[test]
+    fn power_of_two_is_the_one_below() {
+        for (value, expected) in [(1.0, 1.0), (1.99, 1.0), (6.0, 4.0), (0.3, 0.25)] {
+            assert_eq!(power_of_two_below(value), expected);
+        }
+        assert_eq!(power_of_two_below(0.0), 1.0);
+        assert_eq!(power_of_two_below(1e-310), 1.0);
+    }
+}

@@ -43,7 +43,7 @@ mod error;
 mod layout;
 mod multiply;
 
-pub use cpu::{Cpu, Stored, on_cpu};
+pub use cpu::{Cpu, Stored, on_cpu, on_cpu_with_threads};
 pub use error::Error;
 pub use layout::Layout;
 pub use multiply::{ComplianceMultiply, Scalar};

@@ -57,6 +57,14 @@ pub enum Error {
         /// Candidates.
         n_candidates: usize,
     },
+    /// The system gives no threads.
+    #[error("no {n_threads} threads for the multiply: {reason}")]
+    NoThreads {
+        /// So many were asked for.
+        n_threads: usize,
+        /// What the system said.
+        reason: String,
+    },
     /// No graphics adapter is there, or none that may be used.
     #[error(
         "no graphics adapter for the multiply: {looked_for}; install a driver for Vulkan, Metal, Direct3D 12 or OpenGL, or use the processor"

@@ -9,7 +9,8 @@ use crate::connection::Connection;
 use crate::error::Error;
 use crate::layout::{Layout, check_length};
 use crate::multiply::{ComplianceMultiply, check, check_rows};
-use crate::plan::{Job, Panels, Planner, Storage, power_of_two_below};
+use crate::plan::{Job, Panels, Planner, Storage};
+use crate::scaling::power_of_two_below;
 use crate::worker::{Answer, Order, Preparing, Worker};
 
 /// One frame of a display: whoever draws waits no longer for a product than this.

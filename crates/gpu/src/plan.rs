@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::layout::Layout;
+use crate::scaling::power_of_two_below;
 
 /// How a GPU keeps the compliance. Forces and sums are 32-bit there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -345,16 +346,6 @@ impl Planner {
     }
 }
 
-/// The largest power of two not above a positive normal number; 1 for 0. Dividing by it is exact.
-pub(crate) fn power_of_two_below(value: f64) -> f64 {
-    if value < f64::MIN_POSITIVE {
-        // Zero or denormal: nothing physical; kept as it is.
-        return 1.0;
-    }
-    // The exponent bits alone.
-    f64::from_bits(value.to_bits() & (0x7ff << 52))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -437,14 +428,5 @@ mod tests {
         };
         assert_eq!((slices(400, true), slices(400, false)), (1, 32));
         assert_eq!((slices(3, false), slices(13, false)), (1, 4));
-    }
-
-    #[test]
-    fn power_of_two_is_the_one_below() {
-        for (value, expected) in [(1.0, 1.0), (1.99, 1.0), (6.0, 4.0), (0.3, 0.25)] {
-            assert_eq!(power_of_two_below(value), expected);
-        }
-        assert_eq!(power_of_two_below(0.0), 1.0);
-        assert_eq!(power_of_two_below(1e-310), 1.0);
     }
 }

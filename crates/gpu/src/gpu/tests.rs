@@ -6,6 +6,7 @@
 use super::*;
 use crate::guarded::Guarded;
 use crate::multiply::Scalar;
+use crate::numbers::Numbers;
 use crate::{Adapters, on_cpu};
 
 /// Runs `test` on every adapter. Without one: nothing can be opened, and that is an error with a reason.
@@ -20,22 +21,6 @@ fn on_each(test: impl Fn(&Adapter)) {
         let error = adapters.best(true).unwrap_err();
         assert!(matches!(error, Error::NoAdapter { .. }));
         assert!(error.to_string().contains("looked for"), "{error}");
-    }
-}
-
-/// Numbers in [-1, 1) from a seed (linear congruence of Knuth's MMIX).
-struct Numbers(u64);
-
-impl Numbers {
-    fn take(&mut self, n: usize) -> Vec<f64> {
-        let mut next = || {
-            self.0 = self
-                .0
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-        };
-        (0..n).map(|_| next()).collect()
     }
 }
 

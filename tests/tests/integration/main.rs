@@ -7,6 +7,7 @@ mod architecture;
 mod bad_input;
 mod docs;
 mod fast_path;
+mod multiply;
 mod p_method;
 mod scenes;
 mod storage;

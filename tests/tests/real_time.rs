@@ -13,7 +13,7 @@ use glamx::DPose3;
 use snapin::engine::StepReport;
 use snapin::prepare::{PrepareOptions, prepare};
 use snapin::progress::Ui;
-use snapin::scene::{Adaptive, Columns, FreeNodes, PMethod, Scalar, Scene};
+use snapin::scene::{Adaptive, Columns, FreeNodes, Multiply, PMethod, Scalar, Scene};
 use snapin::session::fast::FastSettings;
 use snapin::session::slow::Stepped;
 use snapin::setup;
@@ -85,6 +85,7 @@ fn no_step_of_an_insertion_allocates() {
         scene.accuracy.adaptive = adaptive;
         scene.accuracy.columns = columns;
         scene.accuracy.contact_scalar = contact_scalar;
+        scene.accuracy.multiply = Multiply::Cpu;
         if let Some(rows) = rows {
             scene.accuracy.max_contacts = rows;
         }
@@ -98,7 +99,7 @@ fn no_step_of_an_insertion_allocates() {
         .unwrap();
         let (tool, _) = setup::tool(&scene).unwrap();
         let mut engine = setup::engine(&scene, &prepared, tool).unwrap();
-        let mut shape = Shape::new(&prepared, &scene.accuracy).unwrap();
+        let mut shape = Shape::new(&prepared, &scene.accuracy, None).unwrap();
         let start = scene.tool.pose_part_tool;
         let at = |share: f64| DPose3 {
             translation: start.translation + share * scene.hand.travel * scene.hand.direction,

@@ -19,7 +19,7 @@ use snapin::engine::Engine;
 use snapin::machine::Machine;
 use snapin::prepare::{PrepareOptions, cache, prepare};
 use snapin::progress::Ui;
-use snapin::scene::{Adaptive, FreeNodes, PMethod, Scene};
+use snapin::scene::{Adaptive, FreeNodes, Multiply, PMethod, Scene};
 use snapin::setup;
 use snapin::shape::Shape;
 
@@ -78,6 +78,7 @@ fn variant(mesh: &str, name: &str, order: u8, adaptive: Adaptive) -> Variant {
     scene.part.mesh = scenes.join(mesh);
     scene.part.order = Some(order);
     scene.accuracy.adaptive = adaptive;
+    scene.accuracy.multiply = Multiply::Cpu;
     let mut unseen = std::io::sink();
     let ui = Ui::new(&mut unseen, false);
     let options = PrepareOptions {
@@ -93,7 +94,7 @@ fn variant(mesh: &str, name: &str, order: u8, adaptive: Adaptive) -> Variant {
         is_adaptive: adaptive != Adaptive::Off,
         n_nodes: prepared.loaded.mesh.n_nodes(),
         engine: setup::engine(&scene, &prepared, tool).unwrap(),
-        shape: Shape::new(&prepared, &scene.accuracy).unwrap(),
+        shape: Shape::new(&prepared, &scene.accuracy, None).unwrap(),
         targets: (0..=STEPS)
             .map(|step| DPose3 {
                 translation: start.translation + f64::from(step) / f64::from(STEPS) * way,

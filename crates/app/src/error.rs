@@ -33,6 +33,12 @@ pub enum Error {
     /// The GPU path or its CPU twin.
     #[error("compliance multiply: {0}")]
     Multiply(#[from] gpu::Error),
+    /// `accuracy.multiply = "gpu"` where that cannot be.
+    #[error("accuracy.multiply is \"gpu\", but {source} (multiply = \"auto\" or \"cpu\")")]
+    GpuAsked {
+        /// What is in the way.
+        source: gpu::Error,
+    },
     /// Writing the result.
     #[error("{0}; make room or name another folder with --out (an earlier result is untouched)")]
     Report(#[from] crate::report::ReportError),

@@ -7,17 +7,19 @@ mod words;
 use glam::DVec3;
 
 use crate::Error;
+use crate::choice::Why;
 use crate::effects::{Observed, Verdict, judge};
 use crate::engine::{Engine, Stage};
 use crate::fields::FieldSolver;
 use crate::machine::Machine;
 use crate::prepare::PreparedPart;
 use crate::report::{
-    ContactForce, Effect, Facts, Frame, Handbook, HandbookRow, Outputs, PaperStage, Phase,
-    RateFacts, Run, StepRow, TwoRateFacts, View,
+    ContactForce, Effect, Facts, Frame, Handbook, HandbookRow, MultiplyFacts, MultiplyRace,
+    Outputs, PaperStage, Phase, RateFacts, Run, StepRow, TwoRateFacts, View,
 };
 use crate::scene::{EffectChoice, Scene, ToolShape};
 use crate::session::{Record, Recording, part_extent};
+use crate::shape::Shape;
 use moments::Moments;
 
 /// Everything that a run is made of.
@@ -26,6 +28,7 @@ pub(crate) struct Story<'a> {
     pub(crate) prepared: &'a PreparedPart,
     pub(crate) engine: &'a Engine,
     pub(crate) recording: &'a Recording,
+    pub(crate) shape: &'a Shape,
     pub(crate) remarks: Vec<String>,
     /// What a time budget was made into.
     pub(crate) picked: Option<String>,
@@ -87,6 +90,8 @@ impl Story<'_> {
             .filter(|v| choice(scene, v.name) == EffectChoice::Auto || v.missing)
             .collect();
         let mut warnings = self.remarks.clone();
+        warnings.extend(self.shape.choice().warning());
+        warnings.extend(self.shape.given_up().map(str::to_owned));
         warnings.extend(verdicts.iter().filter(|v| v.missing).map(|v| {
             let number = v.number.map(|n| format!("{n:.2}")).unwrap_or_default();
             format!(
@@ -120,6 +125,7 @@ impl Story<'_> {
                 max_principal_strain: strain,
                 max_rotation_deg: extremes.max_rotation.to_degrees(),
                 rates: rate_facts(recording),
+                multiply: multiply_facts(self.shape),
             },
             handbook: self.handbook(&rows),
             paper: paper(&rows),
@@ -299,6 +305,28 @@ impl Story<'_> {
                 .map(|(travel, force)| (travel + touch, *force))
                 .collect(),
         })
+    }
+}
+
+fn multiply_facts(shape: &Shape) -> MultiplyFacts {
+    let choice = shape.choice();
+    MultiplyFacts {
+        runs_on: choice.runs_on.clone(),
+        is_on_gpu: choice.is_on_gpu,
+        why: choice.why.name(),
+        words: choice.words_in_full(),
+        race: match &choice.why {
+            Why::Faster(race) => Some(MultiplyRace {
+                adapter: race.adapter.clone(),
+                n_contacts: race.n_contacts,
+                processor_s: race.processor_s,
+                gpu_s: race.gpu_s,
+                is_remembered: race.is_remembered,
+            }),
+            _ => None,
+        },
+        n_late: shape.n_late(),
+        given_up: shape.given_up().map(str::to_owned),
     }
 }
 

@@ -7,6 +7,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+pub mod choice;
 pub mod cli;
 pub mod effects;
 pub mod engine;

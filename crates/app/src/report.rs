@@ -23,8 +23,9 @@ use std::path::{Path, PathBuf};
 
 pub use curve::Curve;
 pub use data::{
-    CellKind, ContactForce, Effect, Facts, Frame, Handbook, HandbookRow, N_STAGES, Outputs,
-    PaperStage, PartDrawing, Phase, RateFacts, Run, STAGE_NAMES, StepRow, TwoRateFacts, View,
+    CellKind, ContactForce, Effect, Facts, Frame, Handbook, HandbookRow, MultiplyFacts,
+    MultiplyRace, N_STAGES, Outputs, PaperStage, PartDrawing, Phase, RateFacts, Run, STAGE_NAMES,
+    StepRow, TwoRateFacts, View,
 };
 pub use error::ReportError;
 

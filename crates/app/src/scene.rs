@@ -349,7 +349,7 @@ pub struct Accuracy {
     /// Relative error of the resultant by sharing rows above which a step is counted and reported, > 0.
     pub merge_tolerance: f64,
     /// Number type of the displacement multiply.
-    pub scalar: Scalar,
+    pub scalar: MultiplyScalar,
     /// Number type in which the step reads the compliance between nodes that can touch.
     pub contact_scalar: Scalar,
     /// Which columns of the compliance are there from the start.
@@ -386,7 +386,7 @@ impl Accuracy {
             rates: Rates::Auto,
             tool_features: ToolFeatures::Auto,
             merge_tolerance: raw::default::MERGE_TOLERANCE,
-            scalar: Scalar::F64,
+            scalar: MultiplyScalar::Auto,
             contact_scalar: Scalar::F64,
             columns: Columns::Auto,
             multiply: Multiply::Auto,
@@ -423,9 +423,16 @@ impl Accuracy {
             ContactIterations::Times(1) => "planes once".to_owned(),
             ContactIterations::Times(n) => format!("planes {n} times"),
         };
-        let name = |scalar| match scalar {
+        let contact = match self.contact_scalar {
             Scalar::F64 => "f64",
             Scalar::F32 => "f32",
+        };
+        // Where it is not written, what it has become stands beside where the multiply runs.
+        let shape = match self.scalar {
+            MultiplyScalar::Auto => "",
+            MultiplyScalar::F64 => ", shape in f64",
+            MultiplyScalar::F32 => ", shape in f32",
+            MultiplyScalar::F16 => ", shape in f16",
         };
         let preset = self.preset.map(|p| format!("{}: ", p.name()));
         let rates = match self.rates {
@@ -433,12 +440,10 @@ impl Accuracy {
             Rates::Every(n) => format!(", results {n} periods later"),
         };
         format!(
-            "{}{planes}, interface nodes {}, LCP to {:e}, contact in {}, shape in {}{rates}",
+            "{}{planes}, interface nodes {}, LCP to {:e}, contact in {contact}{shape}{rates}",
             preset.unwrap_or_default(),
             self.adaptive.words(),
             self.lcp_tolerance,
-            name(self.contact_scalar),
-            name(self.scalar),
         )
     }
 }
@@ -560,7 +565,7 @@ pub enum ContactIterations {
     Times(u32),
 }
 
-/// Number type of the displacement multiply.
+/// Number type in which the step reads the compliance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scalar {
     /// 64-bit.
@@ -570,14 +575,30 @@ pub enum Scalar {
     F32,
 }
 
+/// Number type in which the displacement multiply keeps the compliance.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MultiplyScalar {
+    /// 64-bit on the processor, 32-bit on a GPU.
+    #[default]
+    Auto,
+    /// 64-bit: the processor only.
+    F64,
+    /// 32-bit.
+    F32,
+    /// 16-bit on a GPU, 32-bit on the processor.
+    F16,
+}
+
 /// Where the displacement multiply runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Multiply {
-    /// The fastest that is there.
+    /// On the faster of processor and GPU.
     #[default]
     Auto,
-    /// The processor.
+    /// On the processor.
     Cpu,
+    /// On a GPU, or not at all. Not with 64-bit numbers, fetched columns or a constrained part.
+    Gpu,
 }
 
 /// How each effect is to be treated.

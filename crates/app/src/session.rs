@@ -170,6 +170,10 @@ pub fn run(
     let device = Simulated::new(SimulatedSettings::default(), hand)?;
     shape.follow(spec.real_time);
     let rates = choose(spec, engine);
+    if spec.real_time && rates.every.is_none() {
+        // The display is in the loop then.
+        shape.never_wait();
+    }
     let fast = FastSettings {
         period_s: spec.period_s,
         force_resolution: HapticDevice::limits(&device).force_resolution,

@@ -8,16 +8,17 @@
 
 mod select;
 
+use std::path::Path;
 use std::sync::Arc;
 
 use gpu::{ComplianceMultiply, Layout};
 
 use crate::Error;
+use crate::choice::{self, Choice, Multiplier, Why, choose};
 use crate::engine::Engine;
 use crate::follow::Follower;
 use crate::prepare::{Demand, PreparedCompliance, PreparedPart};
-use crate::scene::{Accuracy, Adaptive, PMethod};
-use crate::setup;
+use crate::scene::{Accuracy, Adaptive, Multiply, PMethod};
 use select::Select;
 
 /// Displacement of all surface nodes, with its buffers.
@@ -27,64 +28,84 @@ pub struct Shape {
     forces: Vec<f64>,
     displacement: Vec<f64>,
     follower: Option<Follower>,
+    choice: Choice,
+    /// What a back-end said when it was given up.
+    given_up: Option<String>,
+    /// Whether [`Self::update`] may wait for a driver.
+    waits: bool,
 }
 
 enum Kind {
-    Full(Box<dyn ComplianceMultiply>),
+    Full(Multiplier),
     /// From the columns that were fetched.
     Fetched(Arc<Demand>),
     Select(Box<Select>),
     Constrained {
-        coarse: Box<dyn ComplianceMultiply>,
-        coupling: Box<dyn ComplianceMultiply>,
+        coarse: Multiplier,
+        coupling: Multiplier,
         of_bubbles: Vec<f64>,
     },
 }
 
 impl Shape {
-    /// Uploads the compliance in the number type that `accuracy` asks for.
+    /// Uploads the compliance to where `accuracy` wants it multiplied. `folder`: where it is kept which of processor
+    /// and GPU was faster; `None`: it is measured anew.
     ///
     /// # Errors
-    /// A compliance that the multiply refuses.
-    pub fn new(prepared: &PreparedPart, accuracy: &Accuracy) -> Result<Self, Error> {
+    /// A compliance that the multiply refuses; `"gpu"` where no adapter can multiply.
+    pub fn new(
+        prepared: &PreparedPart,
+        accuracy: &Accuracy,
+        folder: Option<&Path>,
+    ) -> Result<Self, Error> {
         let n_candidates = prepared.loaded.candidates.len();
         let n_rows = prepared.loaded.rows.len();
-        let scalar = setup::scalar(accuracy.scalar);
-        let upload = |n_columns: usize, blocks: &[&[f64]]| {
-            gpu::on_cpu(Layout::new(n_rows, n_columns)?, blocks, scalar)
-        };
-        let mut n_columns = n_candidates;
-        let whole = match &prepared.compliance {
-            PreparedCompliance::All(stored) => stored,
-            PreparedCompliance::Near(demand) => {
-                return Ok(Self {
-                    kind: Kind::Fetched(Arc::clone(demand)),
-                    columns: Vec::new(),
-                    forces: Vec::new(),
-                    displacement: vec![0.0; 3 * n_rows],
-                    follower: None,
-                });
+        let (kind, choice) = match (&prepared.compliance, accuracy.adaptive, &prepared.bubbles) {
+            (PreparedCompliance::Near(demand), ..) => {
+                refuse_gpu(
+                    accuracy,
+                    "its columns are fetched, because the compliance is larger than the memory or the scene says so",
+                )?;
+                let choice = choice::fetched(prepared.loaded.spec.contact_scalar);
+                (Kind::Fetched(Arc::clone(demand)), choice)
             }
-        };
-        let kind = match (accuracy.adaptive, &prepared.bubbles) {
             (
+                PreparedCompliance::All(_),
                 Adaptive::On {
                     method: PMethod::Constrain,
                     ..
                 },
                 Some(bubbles),
             ) => {
-                n_columns = n_columns.max(bubbles.bubbles.len());
-                Kind::Constrained {
-                    coarse: upload(n_candidates, &[&bubbles.coarse])?,
-                    coupling: upload(bubbles.bubbles.len(), &[&bubbles.coupling])?,
+                refuse_gpu(accuracy, "its interface nodes are constrained")?;
+                let on_processor = |n_columns: usize, blocks: &[&[f64]]| {
+                    let layout = Layout::new(n_rows, n_columns)?;
+                    choice::on_processor(layout, blocks, accuracy.scalar, Why::Constrained)
+                };
+                let (coarse, choice) = on_processor(n_candidates, &[&bubbles.coarse])?;
+                let (coupling, _) = on_processor(bubbles.bubbles.len(), &[&bubbles.coupling])?;
+                let kind = Kind::Constrained {
+                    coarse,
+                    coupling,
                     of_bubbles: vec![0.0; 3 * n_rows],
-                }
+                };
+                (kind, choice)
             }
-            (Adaptive::On { free, .. }, _) => {
-                Kind::Select(Box::new(Select::new(prepared, whole, free, scalar)?))
+            (PreparedCompliance::All(whole), Adaptive::On { free, .. }, _) => {
+                let multiply = |layout, blocks: &[&[f64]]| choose(layout, blocks, accuracy, folder);
+                let (select, choice) = Select::new(prepared, whole, free, multiply)?;
+                (Kind::Select(Box::new(select)), choice)
             }
-            (Adaptive::Off, _) => Kind::Full(upload(n_candidates, &whole.stretches())?),
+            (PreparedCompliance::All(whole), Adaptive::Off, _) => {
+                let layout = Layout::new(n_rows, n_candidates)?;
+                let (multiply, choice) = choose(layout, &whole.stretches(), accuracy, folder)?;
+                (Kind::Full(multiply), choice)
+            }
+        };
+        let n_columns = match (&kind, &prepared.bubbles) {
+            (Kind::Fetched(_), _) => 0,
+            (Kind::Constrained { .. }, Some(bubbles)) => n_candidates.max(bubbles.bubbles.len()),
+            _ => n_candidates,
         };
         Ok(Self {
             kind,
@@ -92,7 +113,40 @@ impl Shape {
             forces: Vec::with_capacity(3 * n_columns),
             displacement: vec![0.0; 3 * n_rows],
             follower: None,
+            choice,
+            given_up: None,
+            waits: true,
         })
+    }
+
+    /// Where the multiply runs, and why there.
+    pub fn choice(&self) -> &Choice {
+        &self.choice
+    }
+
+    /// What the adapter said when it was given up for the processor, if it was.
+    pub fn given_up(&self) -> Option<&str> {
+        self.given_up.as_deref()
+    }
+
+    /// How often the adapter was too late, so that the processor multiplied.
+    pub fn n_late(&self) -> u32 {
+        self.multiplier().map_or(0, Multiplier::n_late)
+    }
+
+    /// From now on [`Self::update`] does not wait for a GPU: it gives the newest displacement that is ready, and asks
+    /// for that of the engine's state.
+    pub fn never_wait(&mut self) {
+        self.waits = false;
+    }
+
+    /// The back-end that may run on a GPU.
+    fn multiplier(&self) -> Option<&Multiplier> {
+        match &self.kind {
+            Kind::Full(multiply) => Some(multiply),
+            Kind::Select(select) => Some(select.multiplier()),
+            Kind::Fetched(_) | Kind::Constrained { .. } => None,
+        }
     }
 
     /// Where columns are fetched: [`Self::look_ahead`] does so from now on. `beside`: in a thread of its own, so that
@@ -118,8 +172,8 @@ impl Shape {
         }
     }
 
-    /// Displacement in the engine's state, 3 components for each of the part's rows, m. Does not
-    /// allocate.
+    /// Displacement in the engine's state, 3 components for each of the part's rows, m; after [`Self::never_wait`] on a
+    /// GPU that of an earlier update. Does not allocate, but where a GPU is given up.
     ///
     /// # Errors
     /// Those of the multiply, which an engine's state does not give.
@@ -136,31 +190,62 @@ impl Shape {
         match &mut self.kind {
             Kind::Fetched(demand) => demand.draw_into(contacts, &mut self.displacement),
             Kind::Full(multiply) => {
-                multiply.multiply_into(&self.columns, &self.forces, &mut self.displacement)?;
+                let may_wait = self.waits || !multiply.is_on_gpu();
+                let multiply = multiply.get();
+                if may_wait {
+                    multiply.multiply_into(&self.columns, &self.forces, &mut self.displacement)?;
+                } else {
+                    multiply.newest_into(&mut self.displacement)?;
+                    multiply.begin(&self.columns, &self.forces)?;
+                }
+                note_given_up(multiply, &mut self.given_up);
             }
             Kind::Select(select) => {
                 let rest = engine.part().rest_positions();
-                select.update(rest, &self.columns, &self.forces, &mut self.displacement)?;
+                let given = (self.columns.as_slice(), self.forces.as_slice());
+                select.update(rest, given, self.waits, &mut self.displacement)?;
+                note_given_up(select.multiplier_mut().get(), &mut self.given_up);
             }
             Kind::Constrained {
                 coarse,
                 coupling,
                 of_bubbles,
             } => {
-                coarse.multiply_into(&self.columns, &self.forces, &mut self.displacement)?;
+                coarse
+                    .get()
+                    .multiply_into(&self.columns, &self.forces, &mut self.displacement)?;
                 self.columns.clear();
                 self.forces.clear();
                 for (bubble, amplitude) in engine.bubble_amplitudes() {
                     self.columns.push(*bubble);
                     self.forces.extend(amplitude.to_array());
                 }
-                coupling.multiply_into(&self.columns, &self.forces, of_bubbles)?;
+                coupling
+                    .get()
+                    .multiply_into(&self.columns, &self.forces, of_bubbles)?;
                 for (u, more) in self.displacement.iter_mut().zip(of_bubbles) {
                     *u += *more;
                 }
             }
         }
         Ok(&self.displacement)
+    }
+}
+
+/// `"gpu"` asks for the whole compliance, and for one matrix.
+fn refuse_gpu(accuracy: &Accuracy, why_not: &str) -> Result<(), Error> {
+    if accuracy.multiply != Multiply::Gpu {
+        return Ok(());
+    }
+    Err(Error::Input(format!(
+        "accuracy.multiply is \"gpu\", which asks for the whole compliance of the part, but {why_not}; write multiply = \
+         \"auto\" or \"cpu\""
+    )))
+}
+
+fn note_given_up(multiply: &mut dyn ComplianceMultiply, given_up: &mut Option<String>) {
+    if let Some(remark) = multiply.take_remark() {
+        *given_up = Some(remark);
     }
 }
 

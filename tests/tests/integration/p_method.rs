@@ -8,7 +8,7 @@ use glamx::DPose3;
 use snapin::engine::{Engine, FreeSettings, StepReport, switch_bound};
 use snapin::prepare::{PrepareOptions, PreparedPart, prepare};
 use snapin::progress::Ui;
-use snapin::scene::{Adaptive, FreeNodes, PMethod, Scene};
+use snapin::scene::{Adaptive, FreeNodes, Multiply, PMethod, Scene};
 use snapin::setup;
 use snapin::shape::{Shape, largest};
 use snapin_tests::root;
@@ -21,6 +21,7 @@ struct Clip {
 fn clip(adaptive: Adaptive) -> Clip {
     let mut scene = Scene::load(&root().join("scenes/clip.toml")).unwrap();
     scene.accuracy.adaptive = adaptive;
+    scene.accuracy.multiply = Multiply::Cpu;
     let mut unseen = std::io::sink();
     let ui = Ui::new(&mut unseen, false);
     let spec = setup::part_spec(&scene).unwrap();
@@ -35,7 +36,7 @@ impl Clip {
     }
 
     fn shape(&self) -> Shape {
-        Shape::new(&self.prepared, &self.scene.accuracy).unwrap()
+        Shape::new(&self.prepared, &self.scene.accuracy, None).unwrap()
     }
 
     /// The tool's target after this share of the travel.

@@ -158,7 +158,7 @@ fn session_of(rates: Rates) -> Recording {
     scene.accuracy.rates = rates;
     scene.hand.hold = 0.02;
     let mut engine = engine(&scene, &part);
-    let mut shape = Shape::new(&part, &scene.accuracy).unwrap();
+    let mut shape = Shape::new(&part, &scene.accuracy, None).unwrap();
     session::run(
         &setup::session(&scene),
         &part,

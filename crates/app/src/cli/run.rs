@@ -53,7 +53,7 @@ pub(super) fn run(args: &RunArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u8
     let mut spec = setup::session(&scene);
     spec.real_time |= args.real_time;
     let progress = ui.progress();
-    let mut shape = Shape::new(&prepared, &scene.accuracy)?;
+    let mut shape = Shape::new(&prepared, &scene.accuracy, options.cache_dir.as_deref())?;
     let recording = session::run(&spec, &prepared, &mut engine, &mut shape, &progress)?;
     if spec.real_time || recording.two_rates.is_some() {
         ui.note(&recording.rates.words());
@@ -63,6 +63,7 @@ pub(super) fn run(args: &RunArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u8
         prepared: &prepared,
         engine: &engine,
         recording: &recording,
+        shape: &shape,
         remarks,
         picked,
     };
@@ -81,12 +82,12 @@ pub(super) fn run(args: &RunArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u8
     if args.json {
         print(out, &summary::json(&run, &curve))?;
     } else {
-        print(out, &text(&run, &curve, &target))?;
+        print(out, &text(&run, &curve, &shape, &target))?;
     }
     Ok(0)
 }
 
-fn text(run: &Run, curve: &Curve, target: &std::path::Path) -> String {
+fn text(run: &Run, curve: &Curve, shape: &Shape, target: &std::path::Path) -> String {
     let mut times: Vec<u64> = run
         .rows
         .iter()
@@ -104,7 +105,7 @@ fn text(run: &Run, curve: &Curve, target: &std::path::Path) -> String {
         "{}\n  peak insertion force  {:.3} N at {:.3} mm of travel\n  snap drop             {:.3} N\n  \
          insertion work        {:.3} mJ\n  coupling stiffness    {} N/m, in series with the part\n  \
          step                  median {:.1} us, 99 % below {:.1} us, over {} steps with contact\n  \
-         {}prepared in           {}{}\n  result                {}\n",
+         {}multiply              {}\n  prepared in           {}{}\n  result                {}\n",
         run.title,
         curve.peak_force_n,
         1e3 * curve.travel_at_peak_m,
@@ -115,6 +116,7 @@ fn text(run: &Run, curve: &Curve, target: &std::path::Path) -> String {
         at(0.99),
         times.len(),
         rates_text(&run.facts.rates),
+        shape.choice().words(),
         duration(run.facts.prepare_s),
         if run.facts.from_cache {
             " from the cache"

@@ -171,6 +171,7 @@ impl Story<'_> {
                 format!("order {}", self.prepared.loaded.mesh.order),
             ),
             pair("compliance", self.compliance_words()),
+            pair("multiply", self.shape.choice().words_in_full()),
         ]
     }
 

@@ -85,6 +85,42 @@ pub struct Facts {
     pub max_rotation_deg: f64,
     /// Whether the haptic loop solved whole steps.
     pub rates: RateFacts,
+    /// Where the multiply of the whole surface ran.
+    pub multiply: MultiplyFacts,
+}
+
+/// Where the multiply of the whole surface ran, and why there.
+#[derive(Clone, Debug, Default)]
+pub struct MultiplyFacts {
+    /// Name of the place, with the numbers kept there.
+    pub runs_on: String,
+    /// Whether that is a graphics adapter.
+    pub is_on_gpu: bool,
+    /// Why there, in one word.
+    pub why: &'static str,
+    /// Where and why, in one line.
+    pub words: String,
+    /// Times of processor and adapter, if they were compared.
+    pub race: Option<MultiplyRace>,
+    /// Products that an adapter gave too late.
+    pub n_late: u32,
+    /// Why an adapter was given up on the way, if it was.
+    pub given_up: Option<String>,
+}
+
+/// Times of the multiply on processor and adapter.
+#[derive(Clone, Debug)]
+pub struct MultiplyRace {
+    /// The adapter.
+    pub adapter: String,
+    /// Contacts of the product.
+    pub n_contacts: usize,
+    /// Median, s.
+    pub processor_s: f64,
+    /// Median, s.
+    pub gpu_s: f64,
+    /// Whether it was measured in an earlier run.
+    pub is_remembered: bool,
 }
 
 /// Whether the haptic loop solved whole steps, and what two rates did.

@@ -216,6 +216,12 @@ pub(super) fn run() -> Run {
                     engine_us: None,
                 }),
             },
+            multiply: MultiplyFacts {
+                runs_on: "the processor, 64 bits".into(),
+                why: "asked",
+                words: "the processor, 64 bits, as asked for".into(),
+                ..MultiplyFacts::default()
+            },
         },
         rows: rows(),
         part,

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::curve::Curve;
-use super::data::{RateFacts, Run, STAGE_NAMES, StepRow};
+use super::data::{MultiplyFacts, RateFacts, Run, STAGE_NAMES, StepRow};
 
 /// Order statistics of one stage's time, µs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -95,7 +95,48 @@ struct Summary<'a> {
     step_us: BTreeMap<&'static str, Percentiles>,
     prepare_s: f64,
     rates: RatesSummary<'a>,
+    multiply: MultiplySummary<'a>,
     effects: BTreeMap<&'a str, EffectSummary<'a>>,
+}
+
+#[derive(Serialize)]
+struct MultiplySummary<'a> {
+    runs_on: &'a str,
+    gpu: bool,
+    why: &'a str,
+    words: &'a str,
+    compared: Option<MultiplyRaceSummary<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    late_products: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    given_up: Option<&'a str>,
+}
+
+#[derive(Serialize)]
+struct MultiplyRaceSummary<'a> {
+    adapter: &'a str,
+    contacts: usize,
+    processor_us: f64,
+    gpu_us: f64,
+    measured_earlier: bool,
+}
+
+fn multiply_summary(multiply: &MultiplyFacts) -> MultiplySummary<'_> {
+    MultiplySummary {
+        runs_on: &multiply.runs_on,
+        gpu: multiply.is_on_gpu,
+        why: multiply.why,
+        words: &multiply.words,
+        compared: multiply.race.as_ref().map(|race| MultiplyRaceSummary {
+            adapter: &race.adapter,
+            contacts: race.n_contacts,
+            processor_us: 1e6 * race.processor_s,
+            gpu_us: 1e6 * race.gpu_s,
+            measured_earlier: race.is_remembered,
+        }),
+        late_products: Some(multiply.n_late).filter(|n| *n > 0),
+        given_up: multiply.given_up.as_deref(),
+    }
 }
 
 #[derive(Serialize)]
@@ -172,6 +213,7 @@ pub fn json(run: &Run, curve: &Curve) -> String {
         step_us: stage_percentiles(&run.rows).into_iter().collect(),
         prepare_s: facts.prepare_s,
         rates: rates_summary(&facts.rates),
+        multiply: multiply_summary(&facts.multiply),
         effects: run
             .effects
             .iter()

@@ -16,7 +16,7 @@ use super::error::{SceneError, line_of, plain, suggestion};
 use super::{DeviceModel, Handle, QuadratureRule, Units};
 pub(super) use accuracy::{
     AccuracyKeys, AccuracyRaw, AdaptiveKeys, AdaptiveRaw, IterationsRaw, MethodRaw, MultiplyRaw,
-    PresetRaw, RatesRaw, ScalarRaw, ToolFeaturesRaw,
+    MultiplyScalarRaw, PresetRaw, RatesRaw, ScalarRaw, ToolFeaturesRaw,
 };
 
 /// Values of keys that are not written.

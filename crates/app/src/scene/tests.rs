@@ -498,8 +498,26 @@ fn refusals_name_line_key_and_mend() {
             "clip.toml:23: rates.every does not go with adaptive method \"constrain\"; leave one of the two out, or write method = \"select\"",
         ),
         (
-            adding("[accuracy]\nmultiply = \"gpu\"\n"),
-            "clip.toml:22: multiply \"gpu\" is not in this version; use \"auto\" or \"cpu\"",
+            adding("[accuracy]\nmultiply = \"gpu\"\nscalar = \"f64\"\n"),
+            "clip.toml:23: scalar \"f64\" does not go with multiply \"gpu\", which keeps 32 or 16 bits; write scalar = \"f32\" or \"f16\" or leave it out, or write multiply = \"cpu\"",
+        ),
+        (
+            adding("[accuracy]\ncolumns = \"near\"\nmultiply = \"gpu\"\n"),
+            "clip.toml:22: columns \"near\" does not go with multiply \"gpu\", which needs the whole compliance; leave one of the two out",
+        ),
+        (
+            adding(
+                "[accuracy]\nadaptive = { method = \"constrain\", radius = 1.0 }\nmultiply = \"gpu\"\n",
+            ),
+            "clip.toml:23: multiply \"gpu\" does not go with adaptive method \"constrain\"; leave one of the two out, or write method = \"select\"",
+        ),
+        (
+            adding("[accuracy]\nmultiply = \"opencl\"\n"),
+            "clip.toml:22: multiply has no choice `opencl`; the nearest is `",
+        ),
+        (
+            adding("[accuracy]\ncontact_scalar = \"f16\"\n"),
+            "clip.toml:22: contact_scalar has no choice `f16`; the nearest is `f64`, all are `f64`, `f32`",
         ),
         (
             adding("[accuracy]\ncontact_iterations = 0\n"),
@@ -560,7 +578,7 @@ fn a_preset_sets_all_and_a_key_beside_it_wins() {
     assert_eq!(scene.accuracy, Accuracy::of(Some(Preset::Exact)));
     let scene = adding("[accuracy]\npreset = \"fast\"\nscalar = \"f32\"\n").unwrap();
     assert_eq!(scene.part.order, None);
-    assert_eq!(scene.accuracy.scalar, Scalar::F32);
+    assert_eq!(scene.accuracy.scalar, MultiplyScalar::F32);
     assert_eq!(
         scene.accuracy.contact_iterations,
         ContactIterations::Times(2)
@@ -570,6 +588,32 @@ fn a_preset_sets_all_and_a_key_beside_it_wins() {
     assert_eq!(scene.accuracy.columns, Columns::Near);
     let scene = with("title = \"Clip\"", "accuracy = { budget_us = 200 }").unwrap();
     assert_eq!(scene.accuracy.budget_us, Some(200.0));
+}
+
+/// Where the multiply runs and in which numbers; without a word the program chooses both.
+#[test]
+fn the_multiply_is_told_by_where_and_by_its_numbers() {
+    let multiply = |keys: &str| {
+        let accuracy = adding(&format!("[accuracy]\n{keys}\n")).unwrap().accuracy;
+        (accuracy.multiply, accuracy.scalar)
+    };
+    assert_eq!(multiply(""), (Multiply::Auto, MultiplyScalar::Auto));
+    assert_eq!(
+        multiply("multiply = \"auto\"\nscalar = \"auto\""),
+        (Multiply::Auto, MultiplyScalar::Auto)
+    );
+    assert_eq!(
+        multiply("multiply = \"cpu\"\nscalar = \"f64\""),
+        (Multiply::Cpu, MultiplyScalar::F64)
+    );
+    assert_eq!(
+        multiply("multiply = \"gpu\"\nscalar = \"f16\""),
+        (Multiply::Gpu, MultiplyScalar::F16)
+    );
+    assert_eq!(
+        multiply("preset = \"balanced\"\nmultiply = \"gpu\""),
+        (Multiply::Gpu, MultiplyScalar::Auto)
+    );
 }
 
 /// The p-method is told by a radius or by a table, lengths in the scene's units.

@@ -5,9 +5,10 @@ use std::time::Instant;
 use bytemuck::{cast_slice, cast_slice_mut};
 use fem::{Hierarchy, Rule as Following};
 use glam::DVec3;
-use gpu::{ComplianceMultiply, Layout, Scalar};
+use gpu::{ComplianceMultiply, Layout};
 
 use crate::Error;
+use crate::choice::{Choice, Multiplier};
 use crate::free_nodes::{FreeNodes, Rule};
 use crate::prepare::PreparedPart;
 use crate::scene;
@@ -25,7 +26,7 @@ const TYPICAL_CONTACTS: usize = 16;
 
 /// Rows with principal nodes first, so that they are multiplied as one stretch.
 pub(super) struct Select {
-    multiply: Box<dyn ComplianceMultiply>,
+    multiply: Multiplier,
     free: FreeNodes,
     n_principal: usize,
     /// Row of the surface, by row of the multiply.
@@ -44,12 +45,13 @@ pub(super) struct Select {
 }
 
 impl Select {
+    /// `multiply`: makes the multiply of a compliance.
     pub(super) fn new(
         prepared: &PreparedPart,
         whole: &StoredCompliance,
         free: scene::FreeNodes,
-        scalar: Scalar,
-    ) -> Result<Self, Error> {
+        multiply: impl FnOnce(Layout, &[&[f64]]) -> Result<(Multiplier, Choice), Error>,
+    ) -> Result<(Self, Choice), Error> {
         let loaded = &prepared.loaded;
         let (n_rows, n_candidates) = (loaded.rows.len(), loaded.candidates.len());
         let hierarchy = Hierarchy::of(&loaded.mesh);
@@ -100,17 +102,17 @@ impl Select {
                 permuted.extend_from_slice(whole.block(*row as usize, candidate));
             }
         }
-        let mut multiply = gpu::on_cpu(layout, &[&permuted], scalar)?;
+        let (mut multiply, choice) = multiply(layout, &[&permuted])?;
         let n_interface = n_rows - n_principal;
         let (rule, max_free) = match free {
             scene::FreeNodes::Radius(radius) => (Rule::Radius(radius), n_interface),
             scene::FreeNodes::Indicator(limit) => (Rule::Indicator(limit), n_interface),
             scene::FreeNodes::BudgetUs(budget) => {
-                let rows = affordable_rows(multiply.as_mut(), n_principal, budget)?;
+                let rows = affordable_rows(multiply.get(), n_principal, budget)?;
                 (Rule::Nearest, rows)
             }
         };
-        Ok(Self {
+        let select = Self {
             multiply,
             free: FreeNodes::new(rule, max_free, positions, SWEEP),
             n_principal,
@@ -122,31 +124,44 @@ impl Select {
             listed: Vec::with_capacity(n_interface),
             contacts: Vec::with_capacity(n_candidates),
             u: vec![0.0; 3 * n_rows],
-        })
+        };
+        Ok((select, choice))
+    }
+
+    pub(super) fn multiplier(&self) -> &Multiplier {
+        &self.multiply
+    }
+
+    pub(super) fn multiplier_mut(&mut self) -> &mut Multiplier {
+        &mut self.multiply
     }
 
     pub(super) fn n_free(&self) -> usize {
         self.free.n_free()
     }
 
-    /// `rest`: rest positions of the candidates, m.
+    /// `rest`: rest positions of the candidates, m. `waits`: whether a driver may be waited for; else the displacement is
+    /// that of an earlier update.
     pub(super) fn update(
         &mut self,
         rest: &[DVec3],
-        columns: &[u32],
-        forces: &[f64],
+        (columns, forces): (&[u32], &[f64]),
+        waits: bool,
         displacement: &mut [f64],
     ) -> Result<(), Error> {
         if self.is_moving || self.free.looks_at_bend() {
             self.list_rows();
         }
-        self.multiply.multiply_rows_into(
-            columns,
-            forces,
-            self.n_principal,
-            &self.listed,
-            &mut self.u,
-        )?;
+        let may_wait = waits || !self.multiply.is_on_gpu();
+        let multiply = self.multiply.get();
+        if may_wait {
+            let (n_first, listed) = (self.n_principal, &self.listed);
+            multiply.multiply_rows_into(columns, forces, n_first, listed, &mut self.u)?;
+        } else {
+            // The form that does not wait gives all rows.
+            multiply.newest_into(&mut self.u)?;
+            multiply.begin(columns, forces)?;
+        }
 
         self.contacts.clear();
         self.contacts

@@ -21,13 +21,14 @@ pub use compare::{Errors, Reference};
 pub use measure::{Measured, Times};
 pub use page::write;
 pub use pick::{Picked, resolved};
-pub use point::{Axis, NOT_THERE, Point, Setting};
+pub use point::{Axis, Point, Setting};
 pub use table::text;
 
+use crate::choice::name_of;
 use crate::machine::Machine;
 use crate::prepare::{PrepareOptions, budget::Forecast, load};
 use crate::progress::Ui;
-use crate::scene::{Accuracy, Handle, Preset, Scene};
+use crate::scene::{Accuracy, Handle, Multiply, Preset, Scene};
 use crate::session::part_extent;
 use crate::{Error, interrupt, setup};
 use compare::{Scales, distance, errors};
@@ -97,6 +98,10 @@ pub struct Study {
     pub off_scale: Vec<(String, f64)>,
     /// Settings that were finished before.
     pub n_resumed: usize,
+    /// Name of the graphics adapter that multiplied in some settings.
+    pub adapter: Option<String>,
+    /// A choice that this machine does not have, with the reason.
+    pub not_there: Vec<(&'static str, String)>,
 }
 
 /// Runs or resumes a study.
@@ -114,7 +119,17 @@ pub fn run(
     scene.accuracy.budget_us = None;
     let own_order = store::own_order(&scene)?;
     scene.part.order.get_or_insert(own_order);
+    point::multiply_written(&mut scene);
     let scene = &scene;
+    // Drivers are asked only if a setting may need them.
+    let asks_gpu = options.axes.contains(&Axis::Scalar) || scene.accuracy.multiply == Multiply::Gpu;
+    let adapters = asks_gpu.then(gpu::Adapters::find);
+    let best = adapters.as_ref().and_then(|found| found.best(true).ok());
+    let adapter = best.map(name_of);
+    let not_there = match (&adapters, &adapter) {
+        (Some(found), None) => vec![("multiply on the GPU", found.to_string())],
+        _ => Vec::new(),
+    };
     let identity = store::identity(scene)?;
     let course = Course::of(scene);
     let reference_file = match &options.reference {
@@ -140,8 +155,9 @@ pub fn run(
         done: HashMap::new(),
         prepare_s: HashMap::new(),
         n_resumed: 0,
+        adapter,
     };
-    let own = point::base(scene);
+    let own = runner.base(scene);
     let loaded = load(&setup::part_spec(scene)?)?;
     let scales = Scales {
         direction: match scene.handle {
@@ -161,7 +177,13 @@ pub fn run(
         store::save_reference(file, scene, &identity, &reference)?;
     }
 
-    let points = point::points(scene, &options.axes, store::own_order(scene)?, scales.lever);
+    let points = point::points(
+        scene,
+        &options.axes,
+        store::own_order(scene)?,
+        scales.lever,
+        runner.adapter.as_deref(),
+    );
     let mut rows = Vec::with_capacity(points.len());
     let begun = Instant::now();
     for (k, point) in points.iter().enumerate() {
@@ -215,6 +237,8 @@ pub fn run(
         curves,
         off_scale,
         n_resumed: runner.n_resumed,
+        adapter: runner.adapter,
+        not_there,
     })
 }
 
@@ -230,9 +254,15 @@ struct Runner<'a, 'u> {
     /// s, by part.
     prepare_s: HashMap<String, f64>,
     n_resumed: usize,
+    /// Name of the graphics adapter that multiplies where a setting asks for one.
+    adapter: Option<String>,
 }
 
 impl Runner<'_, '_> {
+    fn base(&self, scene: &Scene) -> Setting {
+        point::base(scene, self.adapter.as_deref())
+    }
+
     fn tell(&self, k: usize, n: usize, begun: Instant, what: &str) {
         let left = if k == 0 {
             String::new()
@@ -270,6 +300,8 @@ impl Runner<'_, '_> {
     fn run_beside_exact(&mut self, setting: &Setting) -> Result<(Measured, Vec<[f64; 6]>), Error> {
         let measured = self.run(setting)?;
         let mut exact = setting.clone();
+        // Wrenches do not depend on where the shape is multiplied.
+        exact.scene.accuracy.multiply = Multiply::Cpu;
         point::set_accuracy(&mut exact.scene, Accuracy::of(Some(Preset::Exact)));
         exact.scene.accuracy.preset = None;
         exact.scene.accuracy.max_contacts = exact.scene.accuracy.max_contacts.max(MOST_CONTACTS);
@@ -315,7 +347,8 @@ impl Runner<'_, '_> {
     /// The most accurate run that can be prepared in [`REFERENCE_S`], and how wrong it may be.
     fn overkill(&mut self, scene: &Scene, scales: &Scales) -> Result<Reference, Error> {
         let exact = |order: u8, refinements: u8| {
-            let mut setting = point::base(scene);
+            let mut setting = point::base(scene, None);
+            setting.scene.accuracy.multiply = Multiply::Cpu;
             point::set_accuracy(&mut setting.scene, Accuracy::of(Some(Preset::Exact)));
             setting.scene.accuracy.preset = None;
             setting.scene.part.order = Some(order);
@@ -364,7 +397,7 @@ impl Runner<'_, '_> {
                 displacement: fine.displacement,
             });
         }
-        let own = self.run(&point::base(scene))?;
+        let own = self.run(&self.base(scene))?;
         Ok(Reference {
             made: "the scene's own setting: nothing finer could be prepared".to_owned(),
             bar: None,

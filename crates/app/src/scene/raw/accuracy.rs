@@ -128,15 +128,29 @@ pub(in crate::scene) enum ScalarRaw {
     F32,
 }
 
+/// Number type of the displacement multiply.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub(in crate::scene) enum MultiplyScalarRaw {
+    /// 64 bits on the processor, 32 on a GPU.
+    Auto,
+    /// 64 bits, on the processor.
+    F64,
+    /// 32 bits, about seven digits.
+    F32,
+    /// 16 bits on a GPU, about three digits; the processor keeps 32.
+    F16,
+}
+
 /// Where the displacement multiply runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub(in crate::scene) enum MultiplyRaw {
-    /// the fastest that is there.
+    /// on the faster of processor and GPU.
     Auto,
-    /// the processor.
+    /// on the processor.
     Cpu,
-    /// not in this version.
+    /// on the best GPU, one in software too, or else an error.
     Gpu,
 }
 
@@ -355,9 +369,10 @@ pub(in crate::scene) struct AccuracyKeys {
     /// and reported, above 0 to 1. It is estimated in each step by the gaps that are left.
     #[schemars(extend("x-quantity" = "number", "default" = default::MERGE_TOLERANCE))]
     pub(in crate::scene) merge_tolerance: Option<At<f64>>,
-    /// Number type of the displacement multiply; forces are always computed in f64.
-    #[schemars(extend("default" = "f64"))]
-    pub(in crate::scene) scalar: Option<At<ScalarRaw>>,
+    /// Number type in which the displacement multiply keeps the compliance: it changes the drawn shape only, forces are
+    /// always computed in f64.
+    #[schemars(extend("default" = "auto"))]
+    pub(in crate::scene) scalar: Option<At<MultiplyScalarRaw>>,
     /// Number type in which the compliance between nodes that can touch is kept for the step; sums and solutions are
     /// in f64. `"f32"` halves the memory and changes forces in the seventh digit.
     #[schemars(extend("default" = "f64"))]
@@ -367,7 +382,9 @@ pub(in crate::scene) struct AccuracyKeys {
     /// factored at each start, and a node whose column came late is eased in. Not with `adaptive`.
     #[schemars(extend("default" = "auto"))]
     pub(in crate::scene) columns: Option<At<Columns>>,
-    /// Where the displacement multiply runs.
+    /// Where the displacement multiply runs; forces do not depend on it. `"auto"` measures processor and GPU once for each
+    /// part, remembers the winner beside the prepared part, and says what it chose; a GPU that fails in a run is given up
+    /// for the processor. `"gpu"` is not for `scalar = "f64"`, `columns = "near"` or `adaptive`'s method `"constrain"`.
     #[schemars(extend("default" = "auto"))]
     pub(in crate::scene) multiply: Option<At<MultiplyRaw>>,
 }

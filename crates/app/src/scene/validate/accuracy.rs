@@ -2,13 +2,13 @@
 
 use super::super::error::line_of;
 use super::super::raw::{
-    AccuracyKeys, AdaptiveKeys, AdaptiveRaw, At, IterationsRaw, MethodRaw, MultiplyRaw, PresetRaw,
-    RatesRaw, ScalarRaw, ToolFeaturesRaw, default,
+    AccuracyKeys, AdaptiveKeys, AdaptiveRaw, At, IterationsRaw, MethodRaw, MultiplyRaw,
+    MultiplyScalarRaw, PresetRaw, RatesRaw, ScalarRaw, ToolFeaturesRaw, default,
 };
 use super::super::units::Quantity;
 use super::super::{
-    Accuracy, Adaptive, Columns, ContactIterations, FreeNodes, Multiply, PMethod, Preset, Rates,
-    Scalar, SceneError, ToolFeatures,
+    Accuracy, Adaptive, Columns, ContactIterations, FreeNodes, Multiply, MultiplyScalar, PMethod,
+    Preset, Rates, Scalar, SceneError, ToolFeatures,
 };
 use super::{Check, Range};
 
@@ -16,14 +16,6 @@ impl Check<'_> {
     /// `period`: of the servo, s.
     pub(super) fn accuracy(&self, raw: &AccuracyKeys, period: f64) -> Result<Accuracy, SceneError> {
         self.refuse_mixed_budget(raw)?;
-        if let Some(at) = raw
-            .multiply
-            .as_ref()
-            .filter(|at| at.value == MultiplyRaw::Gpu)
-        {
-            let what = "multiply \"gpu\" is not in this version".to_owned();
-            return Err(self.error(at.offset, what, "use \"auto\" or \"cpu\""));
-        }
         let preset = raw.preset.map(|preset| match preset {
             PresetRaw::Fast => Preset::Fast,
             PresetRaw::Balanced => Preset::Balanced,
@@ -72,14 +64,63 @@ impl Check<'_> {
                 None => base.merge_tolerance,
             },
             tool_features: self.tool_features(raw)?,
-            scalar: scalar(raw.scalar.as_ref()).unwrap_or(base.scalar),
-            contact_scalar: scalar(raw.contact_scalar.as_ref()).unwrap_or(base.contact_scalar),
-            columns: self.columns(raw, base.adaptive)?,
-            multiply: match raw.multiply.as_ref().map(|at| at.value) {
-                Some(MultiplyRaw::Cpu) => Multiply::Cpu,
-                _ => Multiply::Auto,
+            scalar: match raw.scalar.as_ref().map(|at| at.value) {
+                Some(MultiplyScalarRaw::Auto) => MultiplyScalar::Auto,
+                Some(MultiplyScalarRaw::F64) => MultiplyScalar::F64,
+                Some(MultiplyScalarRaw::F32) => MultiplyScalar::F32,
+                Some(MultiplyScalarRaw::F16) => MultiplyScalar::F16,
+                None => base.scalar,
             },
+            contact_scalar: match raw.contact_scalar.as_ref().map(|at| at.value) {
+                Some(ScalarRaw::F32) => Scalar::F32,
+                Some(ScalarRaw::F64) => Scalar::F64,
+                None => base.contact_scalar,
+            },
+            columns: self.columns(raw, base.adaptive)?,
+            multiply: self.multiply(raw, adaptive)?,
         })
+    }
+
+    fn multiply(&self, raw: &AccuracyKeys, adaptive: Adaptive) -> Result<Multiply, SceneError> {
+        let at = match &raw.multiply {
+            None => return Ok(Multiply::Auto),
+            Some(at) => at,
+        };
+        match at.value {
+            MultiplyRaw::Auto => return Ok(Multiply::Auto),
+            MultiplyRaw::Cpu => return Ok(Multiply::Cpu),
+            MultiplyRaw::Gpu => {}
+        }
+        let is_constrained = matches!(
+            adaptive,
+            Adaptive::On {
+                method: PMethod::Constrain,
+                ..
+            }
+        );
+        let f64_at = raw
+            .scalar
+            .as_ref()
+            .filter(|s| s.value == MultiplyScalarRaw::F64);
+        let near_at = raw.columns.as_ref().filter(|c| c.value == Columns::Near);
+        if let Some(scalar) = f64_at {
+            let what =
+                "scalar \"f64\" does not go with multiply \"gpu\", which keeps 32 or 16 bits";
+            let mend =
+                "write scalar = \"f32\" or \"f16\" or leave it out, or write multiply = \"cpu\"";
+            return Err(self.error(scalar.offset, what.to_owned(), mend));
+        }
+        if let Some(columns) = near_at {
+            let what = "columns \"near\" does not go with multiply \"gpu\", which needs the whole compliance";
+            let mend = "leave one of the two out";
+            return Err(self.error(columns.offset, what.to_owned(), mend));
+        }
+        if is_constrained {
+            let what = "multiply \"gpu\" does not go with adaptive method \"constrain\"".to_owned();
+            let mend = "leave one of the two out, or write method = \"select\"";
+            return Err(self.error(at.offset, what, mend));
+        }
+        Ok(Multiply::Gpu)
     }
 
     fn columns(&self, raw: &AccuracyKeys, preset: Adaptive) -> Result<Columns, SceneError> {
@@ -279,11 +320,4 @@ impl Check<'_> {
     fn radius(&self, at: &At<f64>) -> Result<f64, SceneError> {
         self.number("adaptive radius", at, Quantity::Length, Range::NotNegative)
     }
-}
-
-fn scalar(raw: Option<&At<ScalarRaw>>) -> Option<Scalar> {
-    raw.map(|at| match at.value {
-        ScalarRaw::F32 => Scalar::F32,
-        ScalarRaw::F64 => Scalar::F64,
-    })
 }

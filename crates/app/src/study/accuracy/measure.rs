@@ -281,7 +281,7 @@ pub(super) fn ready(
     let prepared = prepare(&spec, options, ui)?;
     let (tool, _) = setup::tool(&setting.scene)?;
     let engine = setup::engine(&setting.scene, &prepared, tool)?;
-    let shape = Shape::new(&prepared, &setting.scene.accuracy)?;
+    let shape = Shape::new(&prepared, &setting.scene.accuracy, None)?;
     Ok(Ready {
         prepared,
         engine,

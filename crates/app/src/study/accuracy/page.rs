@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::compare::pareto_front;
 use super::table::{PERIOD_US, cells, csv, name, percent};
-use super::{Axis, Errors, Measured, NOT_THERE, Row, Study, store};
+use super::{Axis, Errors, Measured, Row, Study, store};
 use crate::Error;
 use crate::report::html::{STYLE, escaped};
 use crate::report::plot::short;
@@ -152,6 +152,7 @@ fn to_json(study: &Study) -> String {
         "title": study.title,
         "sentence": study.sentence(),
         "machine": study.machine,
+        "gpu": study.adapter,
         "reference": {
             "made": study.reference.made,
             "bar": study.reference.bar,
@@ -275,8 +276,11 @@ fn page(study: &Study, plots: [&String; 4], curves: &str) -> String {
         page.push_str("</table>\n");
     }
     let _ = writeln!(page, "<ul>");
-    for (what, why) in NOT_THERE {
-        let _ = writeln!(page, "<li>{what}: no choice, {why}.</li>");
+    for (what, why) in &study.not_there {
+        let _ = writeln!(page, "<li>{what}: no choice, {}.</li>", escaped(why));
+    }
+    if let Some(adapter) = &study.adapter {
+        let _ = writeln!(page, "<li>The GPU: {}.</li>", escaped(adapter));
     }
     let stages = study.distinct();
     if let Some((row, measured, _)) = stages.iter().find(|(row, ..)| row.is_own) {

@@ -7,7 +7,7 @@ use crate::Error;
 use crate::prepare::PrepareOptions;
 use crate::progress::Ui;
 use crate::report::plot::short;
-use crate::scene::{Accuracy, ContactIterations, Preset, Scene};
+use crate::scene::{Accuracy, ContactIterations, Multiply, MultiplyScalar, Preset, Scene};
 use crate::session::part_extent;
 
 /// Errors that differ by less than this are equal but for chance.
@@ -85,9 +85,11 @@ pub fn resolved(
     }
     let picked = pick(&rungs, budget)
         .map_err(|why| Error::Input(format!("{}: {why}", scene.path.display())))?;
-    let mut scene = kept[picked.rung].scene.clone();
-    scene.accuracy.budget_us = None;
-    Ok((scene, Some(picked.why)))
+    let mut chosen = kept[picked.rung].scene.clone();
+    chosen.accuracy.budget_us = None;
+    chosen.accuracy.multiply = scene.accuracy.multiply;
+    chosen.accuracy.scalar = MultiplyScalar::Auto;
+    Ok((chosen, Some(picked.why)))
 }
 
 /// From the most accurate to the fastest.
@@ -95,7 +97,7 @@ fn ladder(scene: &Scene) -> Vec<(String, Setting)> {
     let mut rungs = Vec::new();
     for order in [3u8, 2, 1] {
         for times in [None, Some(3), Some(2), Some(1)] {
-            let mut setting = base(scene);
+            let mut setting = base(scene, None);
             setting.scene.accuracy.budget_us = None;
             let preset = if order == 3 {
                 Some(Preset::Exact)
@@ -105,6 +107,8 @@ fn ladder(scene: &Scene) -> Vec<(String, Setting)> {
             set_accuracy(&mut setting.scene, Accuracy::of(preset));
             setting.scene.accuracy.preset = None;
             setting.scene.part.order = Some(order);
+            // The budget is that of the step, which the display's multiply is no part of.
+            setting.scene.accuracy.multiply = Multiply::Cpu;
             let planes = match times {
                 None => "planes converged".to_owned(),
                 Some(1) => "1 pass".to_owned(),

@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
+use crate::choice::SOFTWARE;
 use crate::report::plot::short;
 use crate::scene::{
-    Accuracy, Adaptive, ContactIterations, FreeNodes, PMethod, Preset, QuadratureRule, Rates,
-    Scalar, Scene,
+    Accuracy, Adaptive, ContactIterations, FreeNodes, Multiply, MultiplyScalar, PMethod, Preset,
+    QuadratureRule, Rates, Scalar, Scene,
 };
 
 /// What is changed along a line of the plots.
@@ -101,17 +102,15 @@ impl Axis {
     }
 }
 
-/// A choice that this build or this scene does not have, with the reason.
-pub const NOT_THERE: [(&str, &str); 1] =
-    [("multiply on the GPU", "this build has the processor's only")];
-
-/// One setting.
+/// One setting. Where the multiply runs is written in it: what is `"auto"` in the scene is measured on the processor.
 #[derive(Clone, Debug)]
 pub struct Setting {
     /// The scene with its settings changed.
     pub scene: Scene,
     /// How often its mesh is refined.
     pub refinements: u8,
+    /// Name of the graphics adapter that multiplies, if one does.
+    pub adapter: Option<String>,
 }
 
 impl Setting {
@@ -122,8 +121,12 @@ impl Setting {
             budget_us: None,
             ..self.scene.accuracy.clone()
         };
+        let on_adapter = match &self.adapter {
+            Some(adapter) if accuracy.multiply == Multiply::Gpu => format!(" on {adapter}"),
+            _ => String::new(),
+        };
         format!(
-            "{} refined {} order {:?} {:?} {accuracy:?}",
+            "{} refined {} order {:?} {:?} {accuracy:?}{on_adapter}",
             self.scene.part.mesh.display(),
             self.refinements,
             self.scene.part.order,
@@ -164,21 +167,44 @@ pub struct Point {
     pub setting: Setting,
 }
 
-/// The scene's own settings.
-pub(super) fn base(scene: &Scene) -> Setting {
+/// The scene's own settings. `adapter`: name of the graphics adapter that multiplies where a setting asks for one.
+pub(super) fn base(scene: &Scene, adapter: Option<&str>) -> Setting {
     Setting {
         scene: scene.clone(),
         refinements: 0,
+        adapter: adapter.map(str::to_owned),
     }
 }
 
-/// All points of the axes asked for. `own_order`: that of the mesh; `extent`: size of the part, m.
-pub(super) fn points(scene: &Scene, axes: &[Axis], own_order: u8, extent: f64) -> Vec<Point> {
+/// The scene with `"auto"` of the multiply made into what it means on the processor or on a GPU, so that settings are
+/// compared on the same, whatever is faster for each of them.
+pub(super) fn multiply_written(scene: &mut Scene) {
+    let accuracy = &mut scene.accuracy;
+    if accuracy.multiply == Multiply::Auto {
+        accuracy.multiply = Multiply::Cpu;
+    }
+    accuracy.scalar = match (accuracy.multiply, accuracy.scalar) {
+        (Multiply::Gpu, MultiplyScalar::Auto) => MultiplyScalar::F32,
+        (_, MultiplyScalar::Auto) => MultiplyScalar::F64,
+        (Multiply::Cpu, MultiplyScalar::F16) => MultiplyScalar::F32,
+        (_, written) => written,
+    };
+}
+
+/// All points of the axes asked for. `own_order`: that of the mesh; `extent`: size of the part, m; `adapter`: see
+/// [`base`].
+pub(super) fn points(
+    scene: &Scene,
+    axes: &[Axis],
+    own_order: u8,
+    extent: f64,
+    adapter: Option<&str>,
+) -> Vec<Point> {
     let mut all = Vec::new();
     let own = scene.part.order.unwrap_or(own_order);
     for &axis in axes {
         let mut add = |label: String, change: &dyn Fn(&mut Setting)| {
-            let mut setting = base(scene);
+            let mut setting = base(scene, adapter);
             setting.scene.accuracy.preset = None;
             change(&mut setting);
             all.push(Point {
@@ -249,6 +275,7 @@ pub(super) fn points(scene: &Scene, axes: &[Axis], own_order: u8, extent: f64) -
                             method: PMethod::Constrain,
                             free: FreeNodes::Radius(radius),
                         };
+                        s.scene.accuracy.multiply = Multiply::Cpu;
                     });
                 }
                 add("all free".to_owned(), &|s| {
@@ -295,8 +322,26 @@ pub(super) fn points(scene: &Scene, axes: &[Axis], own_order: u8, extent: f64) -
                 }
             }
             Axis::Scalar => {
-                for (label, scalar) in [("f32", Scalar::F32), ("f64", Scalar::F64)] {
-                    add(label.to_owned(), &|s| s.scene.accuracy.scalar = scalar);
+                let mut kept = |label: String, multiply, scalar| {
+                    add(label, &|s| {
+                        s.scene.accuracy.multiply = multiply;
+                        s.scene.accuracy.scalar = scalar;
+                    });
+                };
+                for (name, scalar) in [("f32", MultiplyScalar::F32), ("f64", MultiplyScalar::F64)] {
+                    kept(name.to_owned(), Multiply::Cpu, scalar);
+                }
+                if let Some(adapter) = adapter {
+                    let of = if adapter.ends_with(SOFTWARE) {
+                        format!("the GPU{SOFTWARE}")
+                    } else {
+                        "the GPU".to_owned()
+                    };
+                    for (name, scalar) in
+                        [("f16", MultiplyScalar::F16), ("f32", MultiplyScalar::F32)]
+                    {
+                        kept(format!("{name} on {of}"), Multiply::Gpu, scalar);
+                    }
                 }
             }
             Axis::ContactScalar => {
@@ -337,6 +382,7 @@ pub(super) fn set_accuracy(scene: &mut Scene, accuracy: Accuracy) {
         multiply: scene.accuracy.multiply,
         ..accuracy
     };
+    multiply_written(scene);
 }
 
 fn name_of(mesh: &Path) -> String {

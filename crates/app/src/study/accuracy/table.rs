@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::compare::pareto_front;
-use super::{Axis, Errors, Measured, NOT_THERE, Row, Study};
+use super::{Axis, Errors, Measured, Row, Study};
 use crate::engine::Stage;
 use crate::prepare::budget::{bytes, duration};
 use crate::report::plot::short;
@@ -179,8 +179,11 @@ pub fn text(study: &Study) -> String {
             out.push('\n');
         }
     }
-    for (what, why) in NOT_THERE {
+    for (what, why) in &study.not_there {
         let _ = writeln!(out, "{what}: no choice, {why}");
+    }
+    if let Some(adapter) = &study.adapter {
+        let _ = writeln!(out, "the GPU: {adapter}");
     }
     let _ = writeln!(out, "* the scene's own setting\n\n{}", study.sentence());
     out

@@ -110,3 +110,113 @@ fn ctrl_c_ends_with_130_and_keeps_the_earlier_result() {
         .count();
     assert_eq!(left, 0, "nothing half-written is left");
 }
+
+/// Without any driver "gpu" is refused with what was looked for, "auto" runs on the processor and says so, and so does
+/// the doctor.
+#[test]
+fn without_drivers_gpu_is_refused_and_auto_runs_on_the_processor() {
+    let dir = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(scene()).unwrap();
+    let folder = scene().parent().unwrap().canonicalize().unwrap();
+    let text = text.replace("mesh = \"", &format!("mesh = \"{}/", folder.display()));
+    for (name, word) in [("gpu", "gpu"), ("auto", "auto"), ("cpu", "cpu")] {
+        let text = format!("{text}\n[accuracy]\nmultiply = \"{word}\"\n");
+        std::fs::write(dir.path().join(format!("{name}.toml")), text).unwrap();
+    }
+    let without_drivers = |args: &[&str]| {
+        let mut command = snapin(dir.path());
+        for name in [
+            "VK_ICD_FILENAMES",
+            "VK_DRIVER_FILES",
+            "__EGL_VENDOR_LIBRARY_FILENAMES",
+            "LIBGL_DRIVERS_PATH",
+        ] {
+            command.env(name, "/nonexistent");
+        }
+        // OpenGL is linked to its own drivers on some systems.
+        let output = command
+            .env("WGPU_BACKEND", "vulkan")
+            .args(args)
+            .output()
+            .unwrap();
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        (
+            output.status.code(),
+            text(&output.stdout),
+            text(&output.stderr),
+        )
+    };
+    let (code, out, err) = without_drivers(&["run", "gpu.toml"]);
+    assert_eq!(code, Some(2), "{out}{err}");
+    assert!(
+        err.contains("accuracy.multiply is \"gpu\"") && err.contains("looked for"),
+        "{err}"
+    );
+    assert!(!dir.path().join("out/gpu").exists(), "nothing is written");
+
+    let (code, out, err) = without_drivers(&["run", "auto.toml"]);
+    assert_eq!(code, Some(0), "{err}");
+    assert!(
+        out.contains("multiply              the processor, 64 bits: there is no graphics adapter"),
+        "{out}"
+    );
+    assert!(!err.contains("adapter"), "no warning of it: {err}");
+    let summary = std::fs::read(dir.path().join("out/auto/summary.json")).unwrap();
+    let summary: serde_json::Value = serde_json::from_slice(&summary).unwrap();
+    assert_eq!(summary["multiply"]["why"], "no_adapter");
+    assert_eq!(summary["multiply"]["gpu"], false);
+    let page = std::fs::read_to_string(dir.path().join("out/auto/report.html")).unwrap();
+    assert!(page.contains("looked for adapters of Vulkan, found none"));
+
+    let (code, out, _) = without_drivers(&["run", "cpu.toml"]);
+    assert_eq!(code, Some(0));
+    assert!(
+        out.contains("the processor, 64 bits, as asked for"),
+        "{out}"
+    );
+
+    let (code, out, _) = without_drivers(&["doctor"]);
+    assert_eq!(code, Some(0));
+    assert!(
+        out.contains("on the processor; looked for adapters of Vulkan, found none"),
+        "{out}"
+    );
+}
+
+/// With an adapter, one in software too, "gpu" gives the forces of the processor to the last bit.
+#[test]
+fn gpu_runs_where_there_is_an_adapter_and_gives_the_same_forces() {
+    let dir = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(scene()).unwrap();
+    let folder = scene().parent().unwrap().canonicalize().unwrap();
+    let text = text.replace("mesh = \"", &format!("mesh = \"{}/", folder.display()));
+    for word in ["gpu", "cpu"] {
+        let text = format!("{text}\n[accuracy]\nmultiply = \"{word}\"\n");
+        std::fs::write(dir.path().join(format!("{word}.toml")), text).unwrap();
+    }
+    let doctor = run(dir.path(), &["doctor", "--json"]);
+    let found: serde_json::Value = serde_json::from_slice(&doctor.stdout).unwrap();
+    let findings = found["findings"].as_array().unwrap();
+    let of = |subject: &str| findings.iter().filter(|f| f["subject"] == subject).count();
+    assert_eq!(of("multiply"), 1);
+    let gpu = run(dir.path(), &["run", "gpu.toml"]);
+    let err = String::from_utf8_lossy(&gpu.stderr);
+    if of("adapter") == 0 {
+        eprintln!("no adapter: {err}");
+        assert_eq!(gpu.status.code(), Some(2), "{err}");
+        assert!(err.contains("looked for"), "{err}");
+        return;
+    }
+    assert_eq!(gpu.status.code(), Some(0), "{err}");
+    let cpu = run(dir.path(), &["run", "cpu.toml"]);
+    assert_eq!(cpu.status.code(), Some(0));
+    let forces = |name: &str| {
+        let file = format!("out/{name}/force-travel.csv");
+        std::fs::read_to_string(dir.path().join(file)).unwrap()
+    };
+    assert!(forces("gpu") == forces("cpu"), "forces differ");
+    let summary = std::fs::read(dir.path().join("out/gpu/summary.json")).unwrap();
+    let summary: serde_json::Value = serde_json::from_slice(&summary).unwrap();
+    assert_eq!(summary["multiply"]["why"], "asked");
+    assert_eq!(summary["multiply"]["gpu"], true);
+}

@@ -4,10 +4,12 @@ use std::io::Write;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use serde_json::json;
+use gpu::{Adapter, Adapters, Gpu, GpuSettings, Layout};
+use serde_json::{Value, json};
 
 use super::{json_text, print};
 use crate::Error;
+use crate::choice::name_of;
 use crate::machine::Machine;
 use crate::prepare::budget::bytes;
 use crate::prepare::cache;
@@ -24,23 +26,39 @@ struct Finding {
     works: bool,
     what: String,
     mend: Option<String>,
+    /// Numbers, for JSON.
+    numbers: Value,
+}
+
+impl Finding {
+    fn works(subject: &'static str, what: String) -> Self {
+        Self {
+            subject,
+            works: true,
+            what,
+            mend: None,
+            numbers: Value::Null,
+        }
+    }
 }
 
 pub(super) fn run(args: &DoctorArgs, out: &mut dyn Write) -> Result<u8, Error> {
-    let findings = [
-        processor(),
-        memory(),
-        clock(),
-        cache_folder(),
-        devices(),
-        gpu_path(),
-    ];
+    let mut findings = vec![processor(), memory(), clock(), cache_folder(), devices()];
+    let adapters = Adapters::find();
+    findings.push(multiply(&adapters));
+    findings.extend(adapters.list.iter().map(|one| adapter(one, &adapters)));
     let text = if args.json {
         let list: Vec<_> = findings
             .iter()
-            .map(
-                |f| json!({"subject": f.subject, "works": f.works, "what": f.what, "mend": f.mend}),
-            )
+            .map(|f| {
+                json!({
+                    "subject": f.subject,
+                    "works": f.works,
+                    "what": f.what,
+                    "mend": f.mend,
+                    "numbers": f.numbers,
+                })
+            })
             .collect();
         json_text(&json!({ "findings": list }))
     } else {
@@ -67,28 +85,18 @@ pub(super) fn run(args: &DoctorArgs, out: &mut dyn Write) -> Result<u8, Error> {
 
 fn processor() -> Finding {
     let machine = Machine::read();
-    Finding {
-        subject: "processor",
-        works: true,
-        what: machine.summary(),
-        mend: None,
-    }
+    Finding::works("processor", machine.summary())
 }
 
 fn memory() -> Finding {
     let machine = Machine::read();
     // 72 bytes per pair of nodes: a part whose whole surface can touch.
     let nodes = (machine.available_memory as f64 / 72.0).sqrt();
-    Finding {
-        subject: "memory",
-        works: true,
-        what: format!(
-            "{} free: a part with about {:.0} surface nodes that can all touch",
-            bytes(machine.available_memory as f64),
-            nodes
-        ),
-        mend: None,
-    }
+    let free = bytes(machine.available_memory as f64);
+    Finding::works(
+        "memory",
+        format!("{free} free: a part with about {nodes:.0} surface nodes that can all touch"),
+    )
 }
 
 /// How late the system wakes a thread that asks for the next millisecond.
@@ -119,6 +127,7 @@ fn clock() -> Finding {
              headless runs do not depend on the clock"
                 .to_owned()
         }),
+        numbers: Value::Null,
     }
 }
 
@@ -129,6 +138,7 @@ fn cache_folder() -> Finding {
             works: false,
             what: "no folder for prepared parts is known".to_owned(),
             mend: Some("set SNAPIN_CACHE to a folder, or pass --cache".to_owned()),
+            numbers: Value::Null,
         };
     };
     let probe = dir.join(format!(".probe-{}", std::process::id()));
@@ -144,24 +154,85 @@ fn cache_folder() -> Finding {
         mend: result
             .is_err()
             .then(|| "set SNAPIN_CACHE to a folder, or pass --cache".to_owned()),
+        numbers: Value::Null,
     }
 }
 
 fn devices() -> Finding {
+    Finding::works(
+        "devices",
+        "simulated Virtuose 6D with a simulated hand (this version drives no hardware)".to_owned(),
+    )
+}
+
+/// The processor multiplies in any case.
+fn multiply(adapters: &Adapters) -> Finding {
+    let what = match adapters.best(false) {
+        Ok(best) => format!(
+            "on the processor, or on {} where that is measured to be faster",
+            best.name()
+        ),
+        Err(_) => format!("on the processor; {adapters}"),
+    };
+    Finding::works("multiply", what)
+}
+
+/// Opens an adapter and multiplies on it.
+fn adapter(one: &Adapter, all: &Adapters) -> Finding {
+    let is_auto = all.best(false).is_ok_and(|best| std::ptr::eq(best, one));
+    let auto = match (is_auto, one.is_software()) {
+        (true, _) => "considered by multiply = \"auto\"",
+        (false, true) => "never taken by \"auto\": it is the processor at work",
+        (false, false) => "not taken by \"auto\": another comes first",
+    };
+    let measured = round_trip(one);
+    let trip = match &measured {
+        Ok(trip) => format!("round trip {:.2} ms", 1e3 * trip.as_secs_f64()),
+        Err(error) => error.to_string(),
+    };
     Finding {
-        subject: "devices",
-        works: true,
-        what: "simulated Virtuose 6D with a simulated hand (this version drives no hardware)"
-            .to_owned(),
-        mend: None,
+        subject: "adapter",
+        works: measured.is_ok(),
+        what: format!(
+            "{}: {trip}, bindings up to {}, buffers up to {}, {auto}",
+            name_of(one),
+            binary_bytes(one.binding_limit()),
+            binary_bytes(one.buffer_limit()),
+        ),
+        mend: measured.is_err().then(|| {
+            "bring its driver up to date, or name another adapter in WGPU_ADAPTER_NAME; the processor multiplies \
+             meanwhile"
+                .to_owned()
+        }),
+        numbers: json!({
+            "name": one.name(),
+            "software": one.is_software(),
+            "binding_limit_bytes": one.binding_limit(),
+            "buffer_limit_bytes": one.buffer_limit(),
+            "round_trip_us": measured.as_ref().ok().map(|trip| 1e6 * trip.as_secs_f64()),
+            "considered_by_auto": is_auto,
+            "error": measured.as_ref().err().map(gpu::Error::to_string),
+        }),
     }
 }
 
-fn gpu_path() -> Finding {
-    Finding {
-        subject: "multiply",
-        works: true,
-        what: "on the processor (this version has no GPU path)".to_owned(),
-        mend: None,
+/// Median time of a product with one contact, on a compliance of 1000 surface nodes, 64 of which can touch.
+fn round_trip(adapter: &Adapter) -> Result<Duration, gpu::Error> {
+    const N_ROWS: usize = 1000;
+    const N_CANDIDATES: usize = 64;
+    let layout = Layout::new(N_ROWS, N_CANDIDATES)?;
+    let blocks: Vec<f64> = (0..layout.n_scalars())
+        .map(|k| 1e-4 * (k as f64 * 0.37).sin())
+        .collect();
+    Gpu::new(adapter, layout, &[&blocks], GpuSettings::default()).map(|gpu| gpu.round_trip())
+}
+
+/// Limits of drivers are powers of two, or nearly.
+fn binary_bytes(n: u64) -> String {
+    let mib = n as f64 / (1u64 << 20) as f64;
+    if mib < 1024.0 {
+        format!("{mib:.0} MiB")
+    } else {
+        format!("{:.1} GiB", mib / 1024.0)
     }
 }

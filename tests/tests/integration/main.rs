@@ -10,6 +10,7 @@ mod fast_path;
 mod multiply;
 mod p_method;
 mod scenes;
+mod shape_on_gpu;
 mod storage;
 mod tool_features;
 mod two_rates;

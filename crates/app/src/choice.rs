@@ -260,6 +260,15 @@ pub(crate) fn fetched(scalar: gpu::Scalar) -> Choice {
     Choice::processor(scalar, Why::Fetched)
 }
 
+/// An adapter that nobody waits for, if there is one: as a driver that is too late each time.
+#[cfg(test)]
+pub(crate) fn impatient(layout: Layout, blocks: &[&[f64]]) -> Option<Multiplier> {
+    let mut asking = Asking::new(layout, blocks, MultiplyScalar::Auto);
+    asking.settings.patience = Some(std::time::Duration::ZERO);
+    let chosen = asking.on_gpu(&Adapters::find());
+    chosen.ok().map(|(multiplier, _)| multiplier)
+}
+
 /// A compliance and the numbers in which it is to be kept.
 struct Asking<'a> {
     layout: Layout,

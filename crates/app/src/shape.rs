@@ -7,6 +7,8 @@
 //! engine solves for.
 
 mod select;
+#[cfg(test)]
+mod tests;
 
 use std::path::Path;
 use std::sync::Arc;

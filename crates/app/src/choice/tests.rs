@@ -229,9 +229,8 @@ fn an_adapter_that_fails_leaves_auto_to_the_processor_with_the_reason() {
 fn an_adapter_that_is_late_is_given_up_with_a_remark() {
     let (blocks, adapters) = (blocks(), Adapters::find());
     let blocks = [blocks.as_slice()];
-    let mut asking = Asking::new(layout(), &blocks, MultiplyScalar::Auto);
-    asking.settings.patience = Some(Duration::ZERO);
-    let Ok((mut multiplier, _)) = asking.on_gpu(&adapters) else {
+    let asking = Asking::new(layout(), &blocks, MultiplyScalar::Auto);
+    let Some(mut multiplier) = impatient(layout(), &blocks) else {
         eprintln!("no adapter: {adapters}");
         assert!(adapters.best(true).is_err());
         return;

@@ -297,6 +297,24 @@ mod tests {
     }
 
     #[test]
+    fn an_adapter_that_was_late_or_given_up_is_told_and_one_that_was_not_leaves_no_key() {
+        let mut run = sample::run();
+        let multiply = |run: &Run| -> serde_json::Value {
+            let text = json(run, &Curve::of(&run.rows));
+            let all: serde_json::Value = serde_json::from_str(&text).unwrap();
+            all["multiply"].clone()
+        };
+        let before = multiply(&run);
+        assert_eq!(before["why"], "asked");
+        assert!(before.get("late_products").is_none() && before.get("given_up").is_none());
+        run.facts.multiply.n_late = 3;
+        run.facts.multiply.given_up = Some("it was lost".into());
+        let after = multiply(&run);
+        assert_eq!(after["late_products"], 3);
+        assert_eq!(after["given_up"], "it was lost");
+    }
+
+    #[test]
     fn the_agreed_keys_are_there() {
         let run = sample::run();
         let text = json(&run, &Curve::of(&run.rows));

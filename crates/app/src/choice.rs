@@ -2,7 +2,7 @@
 //!
 //! `"cpu"`: on the processor, without asking any driver. `"gpu"`: on the best adapter, one in software too, or an
 //! error. `"auto"`: on the faster of processor and best real adapter, measured once for each part and remembered
-//! ([`memory`]); what is wrong with an adapter is told, and the processor multiplies.
+//! (`choice/memory.rs`); what is wrong with an adapter is told, and the processor multiplies.
 
 mod memory;
 #[cfg(test)]

@@ -183,9 +183,15 @@ fn search(most_memory: u8) -> Adapters {
     let of_name = wanted.map_or_else(String::new, |part| {
         format!(" named {part:?} (WGPU_ADAPTER_NAME)")
     });
+    let names = if names.is_empty() {
+        // What WGPU_BACKEND names is not there on this system.
+        "nothing (WGPU_BACKEND)".to_owned()
+    } else {
+        names.join(", ")
+    };
     Adapters {
         list,
-        looked_for: format!("looked for adapters of {}{of_name}", names.join(", ")),
+        looked_for: format!("looked for adapters of {names}{of_name}"),
     }
 }
 

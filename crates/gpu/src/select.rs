@@ -49,23 +49,35 @@ pub fn compare(processor: &mut dyn ComplianceMultiply, gpu: &mut Gpu) -> Result<
             })
             .collect()
     };
-    // Forces of both signs would leave a small sum of large terms: more difference than a contact has.
-    let forces = vec![1.0; 3 * n_contacts];
+    // Each contact along one axis, so that the terms of a sum are known.
+    let mut forces = vec![0.0; 3 * n_contacts];
+    for k in 0..n_contacts {
+        forces[3 * k + k % 3] = 1.0;
+    }
     let mut u = vec![0.0; layout.displacement_len()];
     let mut other = u.clone();
     let columns = columns_of(0);
+    let mut terms = vec![0.0; u.len()];
+    for (column, force) in columns.iter().zip(forces.chunks_exact(3)) {
+        processor.multiply_into(&[*column], force, &mut u)?;
+        for (terms, u) in terms.iter_mut().zip(&u) {
+            *terms += u.abs();
+        }
+    }
     processor.multiply_into(&columns, &forces, &mut u)?;
     gpu.multiply_into(&columns, &forces, &mut other)?;
-    let largest = u.iter().fold(f64::MIN_POSITIVE, |m, u| m.max(u.abs()));
-    let apart = |m: f64, (a, b): (&f64, &f64)| {
+    let largest = |x: &[f64]| x.iter().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
+    let apart = |(a, b): (&f64, &f64)| {
         if b.is_finite() {
-            m.max((a - b).abs())
+            (a - b).abs()
         } else {
             f64::INFINITY
         }
     };
-    let difference = u.iter().zip(&other).fold(0.0, apart) / largest;
-    if difference > explained(gpu.storage(), n_contacts) {
+    let apart = u.iter().zip(&other).map(apart).fold(0.0, f64::max);
+    let difference = apart / largest(&u);
+    // The processor's own numbers may be of 32 bits too.
+    if apart > 2.0 * rounding(gpu.storage()) * largest(&terms) {
         return Err(Error::Wrong {
             adapter: gpu.name().to_owned(),
             error: difference,
@@ -90,12 +102,10 @@ pub fn compare(processor: &mut dyn ComplianceMultiply, gpu: &mut Gpu) -> Result<
     })
 }
 
-/// What rounding can make of a product: each term is at most the largest displacement of one force, and as large as
-/// all of them together where they cancel.
-fn explained(storage: Storage, n_contacts: usize) -> f64 {
-    let of_term = match storage {
+/// Of the sum of the terms' magnitudes, what rounding can make of a product.
+fn rounding(storage: Storage) -> f64 {
+    match storage {
         Storage::F32 => 6.0 * 2_f64.powi(-24),
         Storage::F16 => 2_f64.powi(-11),
-    };
-    of_term * 3.0 * n_contacts as f64
+    }
 }

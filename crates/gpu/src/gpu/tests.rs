@@ -404,6 +404,44 @@ fn no_candidate_is_no_displacement() {
     });
 }
 
+#[test]
+fn two_back_ends_are_compared_and_a_wrong_product_is_refused() {
+    on_each(|adapter| {
+        let layout = Layout::new(30, 20).unwrap();
+        let mut numbers = Numbers(31);
+        let blocks = numbers.take(layout.n_scalars());
+        // Columns that nearly cancel each other: rounding is more of the sum then, and not taken for a fault.
+        let half = layout.n_scalars() / 2;
+        let opposite: Vec<f64> = blocks[..half].iter().map(|c| -c * 1.001).collect();
+        let cancelling = [&blocks[..half], &opposite].concat();
+        for storage in [Storage::F32, Storage::F16] {
+            for blocks in [&blocks, &cancelling] {
+                let mut gpu = Gpu::new(adapter, layout, &[blocks], settings(storage)).unwrap();
+                let mut processor = on_cpu(layout, &[blocks], Scalar::F64).unwrap();
+                let compared = crate::compare(processor.as_mut(), &mut gpu).unwrap();
+                assert_eq!(compared.n_contacts, 16);
+                assert!(compared.processor_s > 0.0 && compared.gpu_s > 0.0);
+
+                // One number of a column that is compared, along the axis of its force: of the first, x.
+                let mut other = blocks.clone();
+                other[1] += 0.1;
+                let mut wrong = Gpu::new(adapter, layout, &[&other], settings(storage)).unwrap();
+                let refused = crate::compare(processor.as_mut(), &mut wrong);
+                assert!(matches!(refused, Err(Error::Wrong { .. })), "{refused:?}");
+            }
+        }
+        let nothing = Layout::new(3, 0).unwrap();
+        let mut gpu = Gpu::new(adapter, nothing, &[&[]], settings(Storage::F32)).unwrap();
+        let mut processor = on_cpu(nothing, &[&[]], Scalar::F64).unwrap();
+        assert_eq!(
+            crate::compare(processor.as_mut(), &mut gpu)
+                .unwrap()
+                .n_contacts,
+            0
+        );
+    });
+}
+
 fn guarded(adapter: &Adapter, patience: Option<Duration>) -> (Guarded, Vec<f64>) {
     let layout = Layout::new(50, 4).unwrap();
     let blocks = Numbers(23).take(layout.n_scalars());

@@ -1,9 +1,10 @@
 //! Bytes over time of the displacement multiply on the processor against the memory bandwidth of the machine.
 //!
 //! Measures: `multiply_into` with columns that change from call to call, so that each is read from memory and not from
-//! the cache where the matrix is larger than that; on one thread and on all; and `multiply_batch_into`. Beside it the
-//! bandwidth of one core on as many bytes: the larger of reading (sums over two halves of a vector) and copying
-//! (bytes read and written). Medians.
+//! the cache where the matrix is larger than that; on one thread and on all; and `multiply_batch_into`. Between the
+//! calls, the bandwidth of one core on as many bytes, others in each call, of a vector as large as the matrix: the larger
+//! of reading (sums over two halves) and copying (bytes read and written). Call by call, because other programs take
+//! their share of the memory too. Medians.
 //! `cargo bench -p snapin-gpu --bench multiply` runs it (a minute) and prints the tables; with `SNAPIN_WRITE_DOCS=1` it
 //! writes them into `docs/performance.md`.
 
@@ -25,15 +26,12 @@ const CALLS: usize = 31;
 fn median_seconds(mut call: impl FnMut(usize)) -> f64 {
     call(CALLS);
     call(CALLS + 1);
-    let mut times: Vec<f64> = (0..CALLS)
-        .map(|k| {
-            let begun = Instant::now();
-            call(k);
-            begun.elapsed().as_secs_f64()
-        })
-        .collect();
-    times.sort_by(f64::total_cmp);
-    times[CALLS / 2]
+    let timed = |k| {
+        let begun = Instant::now();
+        call(k);
+        begun.elapsed().as_secs_f64()
+    };
+    median((0..CALLS).map(timed).collect())
 }
 
 /// Sum of a vector, as fast as one core reads it.
@@ -57,19 +55,50 @@ impl pulp::WithSimd for Sum<'_> {
     }
 }
 
-/// GB/s of reading a vector of `bytes`, and of copying half of it to another half, with one core.
-fn bandwidth(bytes: usize) -> (f64, f64) {
-    let arch = pulp::Arch::new();
-    let mut numbers = vec![1.0_f64; bytes / 8];
-    let read = median_seconds(|_| {
-        black_box(arch.dispatch(Sum(black_box(&numbers))));
-    });
-    let (from, to) = numbers.split_at_mut(bytes / 16);
-    let copy = median_seconds(|_| {
-        to[..from.len()].copy_from_slice(from);
-        black_box(&to);
-    });
-    (1e-9 * bytes as f64 / read, 1e-9 * bytes as f64 / copy)
+/// A vector as large as the matrix, of which as much is read and copied as a product reads.
+struct Beside {
+    arch: pulp::Arch,
+    numbers: Vec<f64>,
+    copied: Vec<f64>,
+}
+
+impl Beside {
+    fn new(bytes: usize) -> Self {
+        Self {
+            arch: pulp::Arch::new(),
+            numbers: vec![1.0; bytes / 8],
+            copied: vec![1.0; bytes / 8],
+        }
+    }
+
+    /// Where the numbers of the `call`-th call are: others in each, until all have had their turn.
+    fn range(&self, call: usize, bytes: usize) -> std::ops::Range<usize> {
+        let n = bytes / 8;
+        let turn = call % (self.numbers.len() / n);
+        turn * n..(turn + 1) * n
+    }
+
+    /// Seconds of reading so many bytes.
+    fn read(&self, call: usize, bytes: usize) -> f64 {
+        let numbers = &self.numbers[self.range(call, bytes)];
+        let begun = Instant::now();
+        black_box(self.arch.dispatch(Sum(black_box(numbers))));
+        begun.elapsed().as_secs_f64()
+    }
+
+    /// Seconds of copying half as many, which reads and writes so many.
+    fn copy(&mut self, call: usize, bytes: usize) -> f64 {
+        let range = self.range(call, bytes / 2);
+        let begun = Instant::now();
+        self.copied[range.clone()].copy_from_slice(black_box(&self.numbers[range]));
+        black_box(&self.copied);
+        begun.elapsed().as_secs_f64()
+    }
+}
+
+fn median(mut times: Vec<f64>) -> f64 {
+    times.sort_by(f64::total_cmp);
+    times[times.len() / 2]
 }
 
 /// Columns of the `call`-th call: others every time, so that they come again only after the whole matrix.
@@ -87,6 +116,33 @@ fn seconds(multiply: &mut dyn ComplianceMultiply, contacts: usize) -> f64 {
         multiply.multiply_into(&columns, &forces, &mut u).unwrap();
         black_box(&u);
     })
+}
+
+/// Seconds of a product, and of reading or copying as many bytes, whichever takes less.
+fn seconds_beside(
+    multiply: &mut dyn ComplianceMultiply,
+    contacts: usize,
+    bytes: usize,
+    beside: &mut Beside,
+) -> (f64, f64) {
+    let forces = vec![1.0; 3 * contacts];
+    let mut u = vec![0.0; multiply.layout().displacement_len()];
+    let mut times = [const { Vec::new() }; 3];
+    for call in 0..CALLS + 2 {
+        let columns = columns_of(call, contacts, multiply.layout().n_candidates());
+        let begun = Instant::now();
+        multiply.multiply_into(&columns, &forces, &mut u).unwrap();
+        black_box(&u);
+        let product = begun.elapsed().as_secs_f64();
+        let of_call = [product, beside.read(call, bytes), beside.copy(call, bytes)];
+        if call >= 2 {
+            for (times, time) in times.iter_mut().zip(of_call) {
+                times.push(time);
+            }
+        }
+    }
+    let [product, read, copy] = times.map(median);
+    (product, read.min(copy))
 }
 
 fn batch_seconds(multiply: &mut dyn ComplianceMultiply, contacts: usize, n_sets: usize) -> f64 {
@@ -113,8 +169,8 @@ fn processor() -> String {
 fn main() {
     let n_threads = std::thread::available_parallelism().map_or(1, usize::from);
     let mut text = format!(
-        "Measured on {}, {n_threads} threads. *bandwidth*: what one core reads (or copies, read and written, where that \
-         is more) of a vector as large as the matrix. *share*: of it, with one thread.\n\n\
+        "Measured on {}, {n_threads} threads. *bandwidth*: one core that reads (or copies, read and written, where that \
+         is more) as many bytes, others in each call, of a vector as large as the matrix. *share*: of it, with one thread.\n\n\
          | rows | candidates | matrix | numbers | contacts | µs | GB/s | bandwidth, GB/s | **share** | {n_threads} threads, GB/s |\n\
          | --: | --: | --: | :-- | --: | --: | --: | --: | --: | --: |\n",
         processor()
@@ -140,16 +196,16 @@ fn main() {
             let mut one = on_cpu(layout, &[&blocks], scalar).unwrap();
             let mut all = on_cpu_with_threads(layout, &[&blocks], scalar, n_threads).unwrap();
             let size = one.bytes() as usize;
-            let (read, copy) = bandwidth(size);
-            let most = read.max(copy);
+            let mut beside = Beside::new(size);
             let matrix = format!("{:.0} MB", 1e-6 * size as f64);
             for contacts in [5, 15, 62, 250, 500] {
                 if contacts > n_candidates {
                     continue;
                 }
-                let gigabytes = 1e-9 * (size / n_candidates * contacts) as f64;
-                let time = seconds(&mut *one, contacts);
-                let reached = gigabytes / time;
+                let bytes = size / n_candidates * contacts;
+                let gigabytes = 1e-9 * bytes as f64;
+                let (time, bare) = seconds_beside(&mut *one, contacts, bytes, &mut beside);
+                let (reached, most) = (gigabytes / time, gigabytes / bare);
                 text += &format!(
                     "| {n_rows} | {n_candidates} | {matrix} | {name} | {contacts} | {:.1} | {reached:.1} | {most:.1} | **{:.0} %** | {:.1} |\n",
                     1e6 * time,

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use crate::error::Error;
 use crate::layout::{Layout, check_length};
-use crate::multiply::{ComplianceMultiply, Scalar, check, check_rows};
+use crate::multiply::{ComplianceMultiply, Scalar, check, check_displacement, check_rows};
 use crate::scaling::power_of_two_below;
 use kernels::{Product, SETS, Vectors};
 
@@ -162,11 +162,7 @@ impl<T: Stored> ComplianceMultiply for Cpu<T> {
         displacement: &mut [f64],
     ) -> Result<(), Error> {
         check(self.layout, columns, forces, 1)?;
-        check_length(
-            "displacement",
-            displacement.len(),
-            self.layout.displacement_len(),
-        )?;
+        check_displacement(self.layout, displacement)?;
         self.multiply_range(columns, forces, 0..self.layout.n_rows(), displacement);
         Ok(())
     }
@@ -180,11 +176,7 @@ impl<T: Stored> ComplianceMultiply for Cpu<T> {
         displacement: &mut [f64],
     ) -> Result<(), Error> {
         check(self.layout, columns, forces, 1)?;
-        check_length(
-            "displacement",
-            displacement.len(),
-            self.layout.displacement_len(),
-        )?;
+        check_displacement(self.layout, displacement)?;
         check_rows(self.layout, n_first, rows)?;
         self.multiply_range(columns, forces, 0..n_first, displacement);
         // Rows that follow each other are one stretch.
@@ -242,11 +234,7 @@ impl<T: Stored> ComplianceMultiply for Cpu<T> {
     }
 
     fn newest_into(&mut self, displacement: &mut [f64]) -> Result<bool, Error> {
-        check_length(
-            "displacement",
-            displacement.len(),
-            self.layout.displacement_len(),
-        )?;
+        check_displacement(self.layout, displacement)?;
         if !std::mem::take(&mut self.is_asked) {
             return Ok(false);
         }

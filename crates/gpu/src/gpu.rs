@@ -8,7 +8,7 @@ use crate::adapters::Adapter;
 use crate::connection::Connection;
 use crate::error::Error;
 use crate::layout::{Layout, check_length};
-use crate::multiply::{ComplianceMultiply, check, check_rows};
+use crate::multiply::{ComplianceMultiply, check, check_displacement, check_rows};
 use crate::plan::{Job, Panels, Planner, Storage};
 use crate::scaling::power_of_two_below;
 use crate::worker::{Answer, Order, Preparing, Worker};
@@ -232,6 +232,11 @@ impl Gpu {
         self.worker.is_busy()
     }
 
+    /// Closes the device without waiting for that; every call fails then.
+    pub(crate) fn stop(&self) {
+        self.worker.stop();
+    }
+
     /// Measures the round trip. The time of the product with all candidates, which reads the whole matrix.
     fn measure_round_trip(&mut self) -> Result<Duration, Error> {
         let all: Vec<u32> = (0..self.layout.n_candidates() as u32).collect();
@@ -327,11 +332,7 @@ impl ComplianceMultiply for Gpu {
         displacement: &mut [f64],
     ) -> Result<(), Error> {
         check(self.layout, columns, forces, 1)?;
-        check_length(
-            "displacement",
-            displacement.len(),
-            self.layout.displacement_len(),
-        )?;
+        check_displacement(self.layout, displacement)?;
         self.planner.write(columns, forces, None, &mut self.job);
         self.ask(|answer| write(answer, displacement))
     }
@@ -345,11 +346,7 @@ impl ComplianceMultiply for Gpu {
         displacement: &mut [f64],
     ) -> Result<(), Error> {
         check(self.layout, columns, forces, 1)?;
-        check_length(
-            "displacement",
-            displacement.len(),
-            self.layout.displacement_len(),
-        )?;
+        check_displacement(self.layout, displacement)?;
         check_rows(self.layout, n_first, rows)?;
         let listed = rows.iter().map(|row| 3 * *row as usize);
         if n_first + rows.len() > self.layout.n_rows() {
@@ -432,11 +429,7 @@ impl ComplianceMultiply for Gpu {
     }
 
     fn newest_into(&mut self, displacement: &mut [f64]) -> Result<bool, Error> {
-        check_length(
-            "displacement",
-            displacement.len(),
-            self.layout.displacement_len(),
-        )?;
+        check_displacement(self.layout, displacement)?;
         self.worker
             .take_newest(self.patience, |answer| write(answer, displacement))
     }

@@ -21,6 +21,8 @@ const SILENT: Duration = Duration::from_secs(2);
 /// take longer than a frame.
 pub struct Guarded {
     gpu: Option<Gpu>,
+    /// Kept to the end: to wait for a driver that hangs would be more than a frame.
+    given_up: Option<Gpu>,
     processor: Box<dyn ComplianceMultiply>,
     name: String,
     remark: Option<String>,
@@ -43,6 +45,7 @@ impl Guarded {
         Self {
             name: gpu.name().to_owned(),
             gpu: Some(gpu),
+            given_up: None,
             processor,
             remark: None,
             n_late: 0,
@@ -53,17 +56,6 @@ impl Guarded {
     /// The adapter's back-end, as long as it works: for whoever draws from its memory.
     pub fn gpu(&mut self) -> Option<&mut Gpu> {
         self.gpu.as_mut()
-    }
-
-    /// Both back-ends, to compare them. `None` once the adapter was given up.
-    pub fn both(&mut self) -> Option<(&mut Gpu, &mut (dyn ComplianceMultiply + 'static))> {
-        let processor = self.processor.as_mut();
-        self.gpu.as_mut().map(|gpu| (gpu, processor))
-    }
-
-    /// The processor's back-end alone.
-    pub fn into_processor(self) -> Box<dyn ComplianceMultiply> {
-        self.processor
     }
 
     /// How often the adapter's answer came too late, so that the processor multiplied.
@@ -108,7 +100,10 @@ impl Guarded {
     fn give_up(&mut self, reason: &str) {
         self.remark = Some(format!("{reason}; the processor multiplies from now on"));
         self.processor.name().clone_into(&mut self.name);
-        self.gpu = None;
+        self.given_up = self.gpu.take();
+        if let Some(gpu) = &self.given_up {
+            gpu.stop();
+        }
     }
 }
 

@@ -121,6 +121,12 @@ pub(crate) fn check(
     }
 }
 
+/// Refuses a displacement that is not one number for each component of each row.
+pub(crate) fn check_displacement(layout: Layout, displacement: &[f64]) -> Result<(), Error> {
+    let expected = layout.displacement_len();
+    check_length("displacement", displacement.len(), expected)
+}
+
 /// Refuses rows that do not exist.
 pub(crate) fn check_rows(layout: Layout, n_first: usize, rows: &[u32]) -> Result<(), Error> {
     let n_rows = layout.n_rows();

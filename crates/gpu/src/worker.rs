@@ -303,11 +303,18 @@ impl Worker {
     }
 }
 
+impl Worker {
+    /// Asks the thread to end; does not wait for it.
+    pub(crate) fn stop(&self) {
+        self.shared.lock().stops = true;
+        self.shared.to_worker.notify_one();
+    }
+}
+
 impl Drop for Worker {
     /// Waits for the thread, since drivers fail where a device is closed while the program ends; not for one that hangs.
     fn drop(&mut self) {
-        self.shared.lock().stops = true;
-        self.shared.to_worker.notify_one();
+        self.stop();
         let begun = Instant::now();
         while let Some(thread) = self.thread.take_if(|_| begun.elapsed() < CLOSING) {
             if thread.is_finished() {

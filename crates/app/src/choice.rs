@@ -237,7 +237,7 @@ pub(crate) fn choose(
         Multiply::Auto if accuracy.scalar == MultiplyScalar::F64 => {
             asking.on_processor(Why::Numbers)
         }
-        Multiply::Auto => asking.on_faster(&Adapters::find(), false, folder),
+        Multiply::Auto => asking.on_faster(&Adapters::find_hardware(), false, folder),
         Multiply::Gpu => asking.on_gpu(&Adapters::find()),
     }
 }

@@ -13,6 +13,31 @@ const SEARCH: Duration = Duration::from_secs(20);
 /// there. Where the driver does not tell its memory, it refuses when it has none left.
 const MOST_MEMORY: u8 = 95;
 
+/// Where Linux shows graphics adapters: all but NVIDIA's; NVIDIA's; those of Windows below it; of phones and boards.
+const DEVICES: [&str; 5] = [
+    "/dev/dri/renderD",
+    "/dev/nvidia",
+    "/dev/dxg",
+    "/dev/kgsl-3d",
+    "/dev/mali",
+];
+
+/// Whether the system has a device of a graphics adapter, or does not show whether it has.
+fn has_device() -> bool {
+    let is_named = |name: &str| std::env::var_os(name).is_some();
+    if !cfg!(target_os = "linux") || is_named("WGPU_BACKEND") || is_named("WGPU_ADAPTER_NAME") {
+        return true;
+    }
+    DEVICES.iter().any(|device| {
+        let (folder, begin) = device.rsplit_once('/').unwrap_or(("/", device));
+        std::fs::read_dir(folder).is_ok_and(|entries| {
+            entries
+                .filter_map(Result::ok)
+                .any(|entry| entry.file_name().to_string_lossy().starts_with(begin))
+        })
+    })
+}
+
 /// A graphics adapter of this machine.
 #[derive(Clone, Debug)]
 pub struct Adapter {
@@ -74,6 +99,19 @@ impl Adapters {
     /// `WGPU_ADAPTER_NAME` (part of a name) narrow the search.
     pub fn find() -> Self {
         Self::find_within(MOST_MEMORY)
+    }
+
+    /// As [`Adapters::find`] for who wants none in software: drivers are not asked where the system has no device of a
+    /// graphics adapter, as on most servers. That takes a tenth of a second, and some drivers complain on the error
+    /// stream that nobody is logged in.
+    pub fn find_hardware() -> Self {
+        if has_device() {
+            return Self::find();
+        }
+        Self {
+            list: Vec::new(),
+            looked_for: format!("looked for {}", DEVICES.join(", ")),
+        }
     }
 
     /// The same, with buffers refused from a share of the memory on, %.
@@ -213,5 +251,32 @@ fn backend_name(backend: wgpu::Backend) -> &'static str {
         wgpu::Backend::Gl => "OpenGL",
         wgpu::Backend::BrowserWebGpu => "WebGPU",
         wgpu::Backend::Noop => "none",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_looked_for_is_named() {
+        let nothing = Adapters {
+            list: Vec::new(),
+            looked_for: format!("looked for {}", DEVICES.join(", ")),
+        };
+        let error = nothing.best(true).unwrap_err().to_string();
+        assert!(
+            error.contains("looked for /dev/dri/renderD, /dev/nvidia"),
+            "{error}"
+        );
+        assert!(error.contains("found none"), "{error}");
+        // Where it finds any hardware, the other search does too; one in software alone is no hardware.
+        let found = Adapters::find_hardware();
+        if found.best(false).is_ok() {
+            assert!(Adapters::find().best(false).is_ok());
+        } else {
+            eprintln!("no adapter in hardware: {found}");
+            assert!(found.to_string().contains("looked for"));
+        }
     }
 }

@@ -147,10 +147,14 @@ impl Connection {
                 adapter: self.name.clone(),
                 milliseconds: most.as_millis() as u64,
             }),
-            Err(error) => Err(Error::Refused {
-                adapter: self.name.clone(),
-                reason: error.to_string(),
-            }),
+            Err(error) => Err(self.refused(error.to_string())),
+        }
+    }
+
+    pub(crate) fn refused(&self, reason: String) -> Error {
+        Error::Refused {
+            adapter: self.name.clone(),
+            reason,
         }
     }
 

@@ -1,7 +1,7 @@
 //! The compliance on a device and the passes over it: buffers, pipelines, one submission for each product.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use bytemuck::cast_slice;
@@ -29,6 +29,10 @@ pub(crate) struct OnDevice {
     /// m, 3 for each row; of the last whole product or of the rows that were asked for.
     pub(crate) displacement: wgpu::Buffer,
     job: wgpu::Buffer,
+    /// Mapped between two products: what is written there is copied to `job` on the device.
+    upload: wgpu::Buffer,
+    /// The submission after which it is mapped again, and whether it is.
+    uploaded: Option<(wgpu::SubmissionIndex, Mapped)>,
     read_back: wgpu::Buffer,
     multiply_layout: wgpu::BindGroupLayout,
     reduce_layout: wgpu::BindGroupLayout,
@@ -87,6 +91,7 @@ impl OnDevice {
             let drawn = in_storage | BufferUsages::COPY_SRC | BufferUsages::VERTEX;
             let displacement = c.buffer("displacement", column, drawn);
             let job = c.buffer("job", panels.job_words(1) as u64 * u, in_storage);
+            let upload = upload_buffer(c, job.size());
             let to_read = BufferUsages::MAP_READ | BufferUsages::COPY_DST;
             let read_back = c.buffer("read back", column, to_read);
             let uniform = wgpu::BufferBindingType::Uniform;
@@ -110,6 +115,8 @@ impl OnDevice {
                 partials,
                 displacement,
                 job,
+                upload,
+                uploaded: None,
                 read_back,
                 multiply_layout,
                 reduce_layout,
@@ -178,11 +185,18 @@ impl OnDevice {
         reads_back: bool,
     ) -> Result<Submitted, Error> {
         self.make_room(job)?;
+        self.wait_for_upload()?;
         let c = &self.connection;
-        c.queue.write_buffer(&self.job, 0, cast_slice(&job.words));
+        let of_job = 4 * job.words.len() as u64;
+        self.upload
+            .get_mapped_range_mut(0..of_job)
+            .map_err(|error| c.refused(error.to_string()))?
+            .copy_from_slice(cast_slice(&job.words));
+        self.upload.unmap();
         let mut encoder = c
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.copy_buffer_to_buffer(&self.upload, 0, &self.job, 0, of_job);
         let bytes = if reads_back { 4 * job.n_out as u64 } else { 0 };
         let source = {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
@@ -212,20 +226,18 @@ impl OnDevice {
                 &self.partials
             }
         };
-        let mapped = Arc::new(AtomicU8::new(0));
+        let mapped = Mapped::default();
         if bytes > 0 {
             encoder.copy_buffer_to_buffer(source, 0, &self.read_back, 0, bytes);
-            let mapped = Arc::clone(&mapped);
-            encoder.map_buffer_on_submit(
-                &self.read_back,
-                wgpu::MapMode::Read,
-                0..bytes,
-                move |result| {
-                    mapped.store(1 + u8::from(result.is_err()), Ordering::Release);
-                },
-            );
+            let to_read = 0..bytes;
+            let told = mapped.teller();
+            encoder.map_buffer_on_submit(&self.read_back, wgpu::MapMode::Read, to_read, told);
         }
+        let upload_mapped = Mapped::default();
+        let told = upload_mapped.teller();
+        encoder.map_buffer_on_submit(&self.upload, wgpu::MapMode::Write, .., told);
         let submission = c.queue.submit([encoder.finish()]);
+        self.uploaded = Some((submission.clone(), upload_mapped));
         c.check()?;
         Ok(Submitted {
             submission,
@@ -247,17 +259,29 @@ impl OnDevice {
         if submitted.bytes == 0 {
             return Ok(());
         }
-        let refused = |reason: String| Error::Refused {
-            adapter: c.name.clone(),
-            reason,
-        };
-        if submitted.mapped.load(Ordering::Acquire) != 1 {
-            return Err(refused("the result could not be mapped".to_owned()));
+        if !submitted.mapped.is_mapped() {
+            return Err(c.refused("the result could not be mapped".to_owned()));
         }
         let range = self.read_back.get_mapped_range(0..submitted.bytes);
-        numbers.extend_from_slice(cast_slice(&range.map_err(|e| refused(e.to_string()))?));
+        numbers.extend_from_slice(cast_slice(&range.map_err(|e| c.refused(e.to_string()))?));
         self.read_back.unmap();
         Ok(())
+    }
+
+    /// Waits until the job before has been read, so that the next can be written.
+    fn wait_for_upload(&mut self) -> Result<(), Error> {
+        let Some((submission, mapped)) = self.uploaded.take() else {
+            return Ok(());
+        };
+        if !mapped.is_mapped() {
+            self.connection.wait(submission, UPLOAD)?;
+        }
+        if mapped.is_mapped() {
+            Ok(())
+        } else {
+            let reason = "the job's buffer could not be mapped".to_owned();
+            Err(self.connection.refused(reason))
+        }
     }
 
     /// Larger buffers for the first batch; the same ones afterwards.
@@ -266,11 +290,13 @@ impl OnDevice {
         if of_job <= self.job.size() && of_result <= self.read_back.size() {
             return Ok(());
         }
+        self.wait_for_upload()?;
         let c = self.connection.clone();
-        let bytes = of_job + of_result;
+        let bytes = 2 * of_job + of_result;
         c.scoped(bytes, || {
             if of_job > self.job.size() {
                 self.job = c.buffer("job", of_job, self.job.usage());
+                self.upload = upload_buffer(&c, of_job);
             }
             if of_result > self.read_back.size() {
                 self.read_back = c.buffer("read back", of_result, self.read_back.usage());
@@ -283,9 +309,34 @@ impl OnDevice {
 /// A product on its way.
 pub(crate) struct Submitted {
     submission: wgpu::SubmissionIndex,
-    /// 0 not yet, 1 mapped, 2 failed.
-    mapped: Arc<AtomicU8>,
+    mapped: Mapped,
     bytes: u64,
+}
+
+/// Whether a buffer is mapped; false as long as it is not, and for good where that failed.
+#[derive(Clone, Default)]
+struct Mapped(Arc<AtomicBool>);
+
+impl Mapped {
+    fn is_mapped(&self) -> bool {
+        self.0.load(Ordering::Acquire)
+    }
+
+    /// What the device calls when it has tried.
+    fn teller(&self) -> impl FnOnce(Result<(), wgpu::BufferAsyncError>) + Send + 'static {
+        let mapped = Arc::clone(&self.0);
+        move |result| mapped.store(result.is_ok(), Ordering::Release)
+    }
+}
+
+/// A buffer of so many bytes that is mapped to be written.
+fn upload_buffer(c: &Connection, size: u64) -> wgpu::Buffer {
+    c.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("upload"),
+        size,
+        usage: BufferUsages::MAP_WRITE | BufferUsages::COPY_SRC,
+        mapped_at_creation: true,
+    })
 }
 
 #[cfg(test)]

@@ -77,6 +77,7 @@ fn compliances_of_the_shipped_parts_agree_on_every_adapter() {
                     found.fill(f64::NAN);
                     gpu.multiply_into(columns, &forces, &mut found).unwrap();
                     let difference = difference(&found, &expected);
+                    eprintln!("{storage:?}, {} columns: {difference:.1e}", columns.len());
                     assert!(
                         difference < tolerance,
                         "{} columns: {difference:e}",

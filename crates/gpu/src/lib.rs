@@ -7,7 +7,8 @@
 //! u the displacement of the surface (m). The product reads each number of C once, so what counts is
 //! how much memory is read and in which order. [`Layout`] says where each number lies,
 //! [`ComplianceMultiply`] is what a back-end offers, [`Cpu`] the back-end on the processor with C kept in 64 or
-//! 32 bits.
+//! 32 bits, [`Gpu`] the one on a graphics adapter with C in 32 or 16 bits, and [`Guarded`] the second with the first
+//! behind it. [`Adapters`] says which adapters are there, [`compare`] which of two back-ends is faster.
 //!
 //! # Example
 //!

@@ -11,15 +11,17 @@ use crate::layout::{Layout, check_length};
 use crate::multiply::{ComplianceMultiply, Scalar, check, check_displacement, check_rows};
 use crate::scaling::power_of_two_below;
 use kernels::{Product, SETS, Vectors};
+use pages::Pages;
 
 mod kernels;
+mod pages;
 
 /// Bytes of compliance to read from which threads are used. Measured on 2 cores that share the bandwidth of their
 /// memory: 7 MB take a quarter longer with two threads, which must be woken, 13 MB less time than with one.
 const THREADS_FROM: usize = 8 << 20;
 
 /// A number in which the compliance can be kept.
-pub trait Stored: Copy + Default + Send + Sync + sealed::Sealed {
+pub trait Stored: bytemuck::Pod + Send + Sync + sealed::Sealed {
     /// Name of the back-end that keeps it.
     const NAME: &'static str;
 
@@ -76,10 +78,10 @@ impl Stored for f32 {
 /// ```
 /// beside the rounding of the sum itself. The second term is for numbers that are denormal after the
 /// matrix has been brought near 1 by a power of two; that scaling makes the bound hold in any unit.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Cpu<T> {
     layout: Layout,
-    columns: Vec<T>,
+    columns: Pages<T>,
     /// Power of two; stored number times this is the compliance in m/N.
     unit: f64,
     vectors: Vectors,
@@ -95,7 +97,7 @@ impl<T: Stored> Cpu<T> {
     /// Copies a compliance given as blocks in stretches of rows (see [`Layout`]), m/N.
     ///
     /// # Errors
-    /// Where a length is wrong or a number is not finite.
+    /// Where a length is wrong, a number is not finite, or the system has not the memory.
     pub fn new(layout: Layout, blocks: &[&[f64]]) -> Result<Self, Error> {
         layout.check_blocks(blocks)?;
         let unit = if T::IS_SCALED {
@@ -104,8 +106,8 @@ impl<T: Stored> Cpu<T> {
         } else {
             1.0
         };
-        let mut columns = vec![T::default(); layout.n_scalars()];
-        layout.columns_from_blocks(blocks, &mut columns, |x| T::from_f64(x / unit))?;
+        let mut columns = Pages::new(layout.n_scalars())?;
+        layout.columns_from_blocks(blocks, columns.as_mut_slice(), |x| T::from_f64(x / unit))?;
         Ok(Self {
             layout,
             columns,
@@ -275,7 +277,7 @@ impl<T: Stored> Cpu<T> {
     fn product<'a>(&'a self, columns: &'a [u32], forces: &'a [f64]) -> Product<'a, T> {
         Product {
             layout: self.layout,
-            compliance: &self.columns,
+            compliance: self.columns.as_slice(),
             unit: self.unit,
             columns,
             forces,

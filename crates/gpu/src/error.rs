@@ -57,6 +57,14 @@ pub enum Error {
         /// Candidates.
         n_candidates: usize,
     },
+    /// The system has not the memory for the compliance.
+    #[error("no memory for a compliance of {bytes} bytes on the processor: {reason}")]
+    NoMemory {
+        /// Bytes asked for.
+        bytes: u64,
+        /// What the system said.
+        reason: String,
+    },
     /// The system gives no threads.
     #[error("no {n_threads} threads for the multiply: {reason}")]
     NoThreads {

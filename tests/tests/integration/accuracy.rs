@@ -56,6 +56,9 @@ fn the_study_of_passes_is_whole_resumes_and_refuses_what_is_not_its_own() {
     ] {
         assert!(page.to_lowercase().contains(&text.to_lowercase()), "{text}");
     }
+    // What is drawn is no part of a step: whatever the clock says, no such setting is recommended.
+    let sentence = study["sentence"].as_str().unwrap();
+    assert!(!sentence.contains("scalar"), "{sentence}");
     // On any adapter, one in software too; where there is none, the study says what was looked for.
     match first.out.contains("on the GPU  ") || first.out.contains("on the GPU, software") {
         true => {

@@ -1,5 +1,7 @@
 //! What the tests of the whole share: the program run in-process, and the shipped files.
 
+pub mod brick;
+
 use std::path::{Path, PathBuf};
 
 /// Root of the checkout.

@@ -1,5 +1,5 @@
 //! The command line. Each command turns typed arguments into meaning before any work; errors and
-//! exit codes meet here: 0 done, 1 result out of tolerance, 2 usage or input error, 130 Ctrl-C.
+//! exit codes meet here: 0 done, 1 result out of tolerance, 2 usage or input error, 70 a fault of the program, 130 Ctrl-C.
 
 mod accuracy;
 mod doctor;
@@ -13,7 +13,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
-use crate::Error;
+use crate::{Error, crash};
 use crate::prepare::{PrepareOptions, cache};
 use crate::progress::Ui;
 
@@ -77,6 +77,14 @@ impl CacheArgs {
 /// Runs the program: parses `args` (the first is the program's name), does the command, writes
 /// results to `out` and everything else to `err`, and returns the exit code.
 pub fn run(
+    args: impl IntoIterator<Item = impl Into<OsString> + Clone>,
+    out: &mut dyn Write,
+    err: &mut dyn Write,
+) -> u8 {
+    crash::guard(err, |err| command(args, out, err))
+}
+
+fn command(
     args: impl IntoIterator<Item = impl Into<OsString> + Clone>,
     out: &mut dyn Write,
     err: &mut dyn Write,

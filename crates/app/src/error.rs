@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::interrupt;
+use crate::{crash, interrupt};
 
 /// Why a command ended without its result.
 #[derive(Debug, thiserror::Error)]
@@ -66,10 +66,11 @@ pub enum Error {
 }
 
 impl Error {
-    /// 130 for Ctrl-C, else 2: a usage or input error.
+    /// 130 for Ctrl-C, 70 for a fault of the program, else 2: a usage or input error.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Interrupted => interrupt::EXIT_CODE,
+            Self::EngineEnded => crash::EXIT_CODE,
             Self::Part { source, .. } if source.is_cancelled() => interrupt::EXIT_CODE,
             _ => 2,
         }

@@ -9,6 +9,7 @@
 
 pub mod choice;
 pub mod cli;
+pub mod crash;
 pub mod effects;
 pub mod engine;
 mod error;

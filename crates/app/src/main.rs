@@ -3,6 +3,7 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    snapin::crash::install();
     snapin::interrupt::install();
     let mut out = std::io::stdout().lock();
     let mut err = std::io::stderr();

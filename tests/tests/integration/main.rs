@@ -9,6 +9,7 @@ mod docs;
 mod fast_path;
 mod multiply;
 mod p_method;
+mod random_scenes;
 mod scenes;
 mod shape_on_gpu;
 mod storage;

@@ -150,9 +150,7 @@ impl Edges {
             }
         }
         self.n_of_rows = self.involved.len();
-        if self.rows.is_empty() {
-            return;
-        }
+        // Also where no point is at a face: the operator of the planes alone is made of the blocks of these.
         for plane in planes {
             let involved_in = &mut self.involved_in[plane.candidate as usize];
             if *involved_in != pass {

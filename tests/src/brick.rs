@@ -28,9 +28,7 @@ impl Brick<'_> {
             for j in 0..=ny {
                 for i in 0..=nx {
                     let at = [(i, 0), (j, 1), (k, 2)];
-                    places.push(at.map(|(n, c)| {
-                        self.size[c] * n as f64 / self.cells[c] as f64
-                    }));
+                    places.push(at.map(|(n, c)| self.size[c] * n as f64 / self.cells[c] as f64));
                 }
             }
         }
@@ -41,9 +39,10 @@ impl Brick<'_> {
                     if (self.is_hole)([i, j, k]) {
                         continue;
                     }
-                    tets.extend(six_of_a_brick().map(|tet| {
-                        tet.map(|[a, b, c]| number(i + a, j + b, k + c))
-                    }));
+                    tets.extend(
+                        six_of_a_brick()
+                            .map(|tet| tet.map(|[a, b, c]| number(i + a, j + b, k + c))),
+                    );
                 }
             }
         }
@@ -53,7 +52,14 @@ impl Brick<'_> {
 
 /// Corners of the six tetrahedra along the diagonal of a brick (Kuhn), each of positive volume.
 fn six_of_a_brick() -> [[[usize; 3]; 4]; 6] {
-    let ways = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
+    let ways = [
+        [0, 1, 2],
+        [1, 2, 0],
+        [2, 0, 1],
+        [0, 2, 1],
+        [2, 1, 0],
+        [1, 0, 2],
+    ];
     std::array::from_fn(|k| {
         let mut corner = [0; 3];
         let mut tet = [[0; 3]; 4];
@@ -85,7 +91,10 @@ fn write_msh(
             sides.entry(key).or_insert((0, face)).0 += 1;
         }
     }
-    let boundary = sides.values().filter(|(n, _)| *n == 1).map(|(_, face)| *face);
+    let boundary = sides
+        .values()
+        .filter(|(n, _)| *n == 1)
+        .map(|(_, face)| *face);
     // Each combination of groups is one entity of the file.
     let mut by_groups: BTreeMap<(usize, u32), Vec<Vec<usize>>> = BTreeMap::new();
     let mut add = |dimension: usize, groups: &[Takes<'_>], nodes: Vec<usize>| {
@@ -96,7 +105,9 @@ fn write_msh(
     };
     boundary.for_each(|face| add(2, faces, face.to_vec()));
     let body: Takes<'_> = ("body", &|_| true);
-    let volumes: Vec<Takes<'_>> = std::iter::once(body).chain(volumes.iter().copied()).collect();
+    let volumes: Vec<Takes<'_>> = std::iter::once(body)
+        .chain(volumes.iter().copied())
+        .collect();
     tets.iter().for_each(|tet| add(3, &volumes, tet.to_vec()));
     // Faces of no group need not be there.
     by_groups.remove(&(2, 0));
@@ -128,18 +139,30 @@ fn write_msh(
         ));
     }
     let used: Vec<usize> = (0..places.len()).filter(|n| is_used[*n]).collect();
-    line(format_args!("$EndEntities\n$Nodes\n1 {0} 1 {1}\n3 {2} 0 {0}", used.len(), places.len(), by_groups.len()));
+    line(format_args!(
+        "$EndEntities\n$Nodes\n1 {0} 1 {1}\n3 {2} 0 {0}",
+        used.len(),
+        places.len(),
+        by_groups.len()
+    ));
     used.iter().for_each(|n| line(format_args!("{}", n + 1)));
     for n in &used {
         let [x, y, z] = places[*n];
         line(format_args!("{x} {y} {z}"));
     }
     let n_elements: usize = by_groups.values().map(Vec::len).sum();
-    line(format_args!("$EndNodes\n$Elements\n{} {n_elements} 1 {n_elements}", by_groups.len()));
+    line(format_args!(
+        "$EndNodes\n$Elements\n{} {n_elements} 1 {n_elements}",
+        by_groups.len()
+    ));
     let mut tag = 0;
     for (entity, ((dimension, _), elements)) in by_groups.iter().enumerate() {
         let kind = 2 * (dimension - 1);
-        line(format_args!("{dimension} {} {kind} {}", entity + 1, elements.len()));
+        line(format_args!(
+            "{dimension} {} {kind} {}",
+            entity + 1,
+            elements.len()
+        ));
         for nodes in elements {
             tag += 1;
             let nodes: Vec<String> = nodes.iter().map(|n| (n + 1).to_string()).collect();

@@ -13,9 +13,9 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
-use crate::{Error, crash};
 use crate::prepare::{PrepareOptions, cache};
 use crate::progress::Ui;
+use crate::{Error, crash};
 
 /// Feel whether a plastic clip snaps on before a mould is cut.
 #[derive(Debug, Parser)]

@@ -156,7 +156,10 @@ mod tests {
         let text = String::from_utf8(err).unwrap();
         assert_eq!(code, 70);
         assert_eq!(text.lines().count(), 1, "{text}");
-        assert!(text.contains("two lines (") && text.contains("crash.rs:"), "{text}");
+        assert!(
+            text.contains("two lines (") && text.contains("crash.rs:"),
+            "{text}"
+        );
 
         // What goes well says nothing.
         let mut err = Vec::new();

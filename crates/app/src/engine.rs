@@ -19,6 +19,7 @@ mod part;
 mod pass;
 mod prune;
 mod report;
+mod rigid;
 mod scratch;
 mod switch;
 mod watch;
@@ -207,6 +208,7 @@ impl Engine {
             near_distance,
             n_candidates,
             max_rows,
+            self.coupling.is_none(),
         );
         self.edges = Some(Box::new(edges));
         self
@@ -404,6 +406,7 @@ impl Engine {
         }
         report.passes = 0;
         report.converged = false;
+        let rigid_before = report.rigid_depth;
         let mut tool_pose = VirtualCoupling::pose_from_deviation(target, &self.deviation);
         let mut change_before = f64::INFINITY;
         while report.passes < max_passes {
@@ -426,6 +429,8 @@ impl Engine {
         ) {
             report.converged = true;
         }
+        // In any stride of the step.
+        report.rigid_depth = report.rigid_depth.max(rigid_before);
         report.tool_pose = tool_pose;
         let on_faces = self.edges.as_ref().map_or(0, |edges| edges.n_carried());
         report.contacts = (self.scratch.n_own + on_faces) as u32;

@@ -192,7 +192,7 @@ impl Story<'_> {
             .contacts(record)
             .iter()
             .map(|c| {
-                let node = loaded.candidates[c.candidate as usize];
+                let node = loaded.contact_node(c.candidate);
                 let rest = DVec3::from_array(loaded.mesh.nodes[node as usize]);
                 ContactForce {
                     node,

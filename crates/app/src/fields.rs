@@ -67,7 +67,7 @@ impl<'a> FieldSolver<'a> {
         let n_dofs = 3 * self.loaded.mesh.n_nodes();
         let mut force = vec![0.0; n_dofs];
         for c in recording.contacts(record) {
-            let at = 3 * self.loaded.candidates[c.candidate as usize] as usize;
+            let at = 3 * self.loaded.contact_node(c.candidate) as usize;
             force[at..at + 3].copy_from_slice(&c.force_on_part.to_array());
         }
         match &self.solver {

@@ -130,13 +130,34 @@ pub struct LoadedPart {
     pub mesh: Mesh,
     /// Held degrees of freedom.
     pub supports: Supports,
-    /// Node indices that can touch, not held, ascending.
+    /// Node indices that can touch and may move, ascending.
     pub candidates: Vec<u32>,
+    /// Node indices that can touch and are held in all directions, ascending: obstacles that do not give way.
+    pub held: Vec<u32>,
     /// Node indices of the whole surface, candidates first.
     pub rows: Vec<u32>,
     /// Lines about the mesh that the user should see.
     pub warnings: Vec<String>,
     mesh_hash: [u8; 32],
+}
+
+impl LoadedPart {
+    /// Node of a candidate of the engine's part: first those that may move, then those that are held.
+    pub fn contact_node(&self, candidate: u32) -> u32 {
+        let candidate = candidate as usize;
+        match candidate.checked_sub(self.candidates.len()) {
+            None => self.candidates[candidate],
+            Some(held) => self.held[held],
+        }
+    }
+
+    /// m, of the held nodes that can touch.
+    pub fn held_positions(&self) -> Vec<DVec3> {
+        let places = self.held.iter();
+        places
+            .map(|&node| DVec3::from_array(self.mesh.nodes[node as usize]))
+            .collect()
+    }
 }
 
 /// A part with its compliance.
@@ -183,7 +204,9 @@ impl PreparedPart {
         let (n_rows, n_bubbles) = (bubbles.rows.len(), bubbles.bubbles.len());
         let n_candidates = bubbles.candidates.len();
         // The step reads the bubbles of one candidate after the other.
-        let mut coupling = vec![0.0; 9 * n_candidates * n_bubbles];
+        // Held candidates, which come last, neither move bubbles nor are moved by them.
+        let held = self.loaded.held_positions();
+        let mut coupling = vec![0.0; 9 * (n_candidates + held.len()) * n_bubbles];
         for j in 0..n_bubbles {
             for i in 0..n_candidates {
                 coupling[9 * (i * n_bubbles + j)..][..9]
@@ -197,14 +220,17 @@ impl PreparedPart {
             .map(f64::sqrt)
             .collect();
         let largest = norms.iter().copied().fold(0.0, f64::max);
+        let bounds = norms.iter().map(|norm| (norm * largest).sqrt());
         let data = BubbleData {
             positions: bubbles.bubbles.iter().map(at).collect(),
             coupling,
             sigma: bubbles.sigma.clone(),
-            bounds: norms.iter().map(|norm| (norm * largest).sqrt()).collect(),
+            bounds: bounds.chain(held.iter().map(|_| 0.0)).collect(),
         };
         let rest = bubbles.candidates.iter().map(at).collect();
-        (ContactPart::new(rest, n_rows, bubbles.coarse.clone()), data)
+        let blocks = Blocks::F64(Source::Owned(bubbles.coarse.clone()));
+        let part = ContactPart::with_all_and_held(rest, &held, n_rows, blocks);
+        (part, data)
     }
 
     /// What the engine needs of the part. Shares the compliance unless it is rounded to 32 bits.
@@ -223,7 +249,9 @@ impl PreparedPart {
             Scalar::F64 => Blocks::F64(Source::Shared(Arc::clone(stored.contact()))),
             Scalar::F32 => Blocks::rounded(stored.contact()),
         };
-        Arc::new(ContactPart::with_all(rest, stored.n_candidates(), blocks))
+        let held = self.loaded.held_positions();
+        let n_rows = stored.n_candidates();
+        Arc::new(ContactPart::with_all_and_held(rest, &held, n_rows, blocks))
     }
 }
 
@@ -252,24 +280,11 @@ pub fn load(spec: &PartSpec) -> Result<LoadedPart, Error> {
             supports.fix_node(node, *components);
         }
     }
-    let warnings = mesh.check(&supports).map_err(|e| Error::part(path, e))?;
-
+    let mut warnings = mesh.check(&supports).map_err(|e| Error::part(path, e))?;
+    let Touchable { candidates, held } = touchable(&mesh, spec, &supports, &mut warnings)?;
     let mut can_touch = vec![false; mesh.n_nodes()];
-    for name in &spec.contact {
-        for &node in &group(&mesh, name, path, "contact")?.nodes {
-            can_touch[node as usize] = !supports.is_fixed_in_all(node);
-        }
-    }
-    let candidates: Vec<u32> = (0..mesh.n_nodes() as u32)
-        .filter(|&i| can_touch[i as usize])
-        .collect();
-    if candidates.is_empty() && !spec.contact.is_empty() {
-        return Err(Error::Input(format!(
-            "{}: every node of contact is held in {}, so nothing can touch; name a group of faces \
-             that are free to move",
-            spec.contact[0].place,
-            path.display(),
-        )));
+    for &node in &candidates {
+        can_touch[node as usize] = true;
     }
     let mut rows = candidates.clone();
     rows.extend(
@@ -282,10 +297,68 @@ pub fn load(spec: &PartSpec) -> Result<LoadedPart, Error> {
         mesh,
         supports,
         candidates,
+        held,
         rows,
         warnings,
         mesh_hash,
     })
+}
+
+/// Nodes of the contact groups, ascending.
+struct Touchable {
+    candidates: Vec<u32>,
+    held: Vec<u32>,
+}
+
+/// Sorts the nodes of the contact groups. Those of no element are a leftover of the model, not the part's, and are told
+/// in `warnings`.
+fn touchable(
+    mesh: &Mesh,
+    spec: &PartSpec,
+    supports: &Supports,
+    warnings: &mut Vec<String>,
+) -> Result<Touchable, Error> {
+    let path = &spec.mesh_path;
+    let mut is_of_part = vec![false; mesh.n_nodes()];
+    for element in 0..mesh.n_elements() {
+        for &node in mesh.element_nodes(element) {
+            is_of_part[node as usize] = true;
+        }
+    }
+    let mut is_of_contact = vec![false; mesh.n_nodes()];
+    for name in &spec.contact {
+        let nodes = &group(mesh, name, path, "contact")?.nodes;
+        let loose = nodes.iter().filter(|node| !is_of_part[**node as usize]);
+        let (n_loose, first) = (loose.clone().count(), loose.clone().next());
+        if let Some(&first) = first {
+            warnings.push(format!(
+                "{n_loose} of {} nodes of the contact group {:?} are in no element (the first is node {}): a surface \
+                 left over beside the part, or that of another body; nothing can touch them",
+                nodes.len(),
+                name.name,
+                mesh.node_tags[first as usize],
+            ));
+        }
+        for &node in nodes {
+            is_of_contact[node as usize] = is_of_part[node as usize];
+        }
+    }
+    let (held, candidates): (Vec<u32>, Vec<u32>) = (0..mesh.n_nodes() as u32)
+        .filter(|&node| is_of_contact[node as usize])
+        .partition(|&node| supports.is_fixed_in_all(node));
+    if let (true, Some(first)) = (candidates.is_empty(), spec.contact.first()) {
+        let why = if held.is_empty() {
+            "no node of contact is in an element of"
+        } else {
+            "every node of contact is held in"
+        };
+        return Err(Error::Input(format!(
+            "{}: {why} {}, so nothing that gives way can touch; name a group of faces that are free to move",
+            first.place,
+            path.display(),
+        )));
+    }
+    Ok(Touchable { candidates, held })
 }
 
 fn group<'a>(

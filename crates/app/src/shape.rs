@@ -184,7 +184,9 @@ impl Shape {
         self.columns.clear();
         self.forces.clear();
         if !matches!(self.kind, Kind::Fetched(_)) {
-            for c in contacts {
+            // Forces on held nodes move nothing.
+            let part = engine.part();
+            for c in contacts.iter().filter(|c| !part.is_held(c.candidate)) {
                 self.columns.push(c.candidate);
                 self.forces.extend(c.force_on_part.to_array());
             }

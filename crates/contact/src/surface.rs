@@ -197,9 +197,12 @@ impl Surface {
         (node as usize) < self.n_candidates
     }
 
-    /// Faces that a candidate is a node of.
+    /// Faces that a candidate is a node of; none for a number beyond the candidates.
     pub fn faces_of(&self, candidate: u32) -> &[u32] {
         let c = candidate as usize;
+        if c >= self.n_candidates {
+            return &[];
+        }
         &self.faces_of[self.first_of[c] as usize..self.first_of[c + 1] as usize]
     }
 

@@ -57,23 +57,36 @@ fn parts() -> Vec<PartCase> {
     let skin = |_: &[[f64; 3]]| true;
     let root = |c: &[[f64; 3]]| all(&|x| x[0] < 0.0201, c);
     let top = |c: &[[f64; 3]]| all(&|x| x[2] > 0.0099, c);
-    let part = |name, keys, cells, size, is_hole: &dyn Fn([usize; 3]) -> bool, volumes: &[Takes<'_>]| {
-        let faces: [Takes<'_>; 4] = [
-            ("left", &left),
-            ("bottom", &bottom),
-            ("top", &top),
-            ("skin", &skin),
-        ];
-        PartCase {
-            name,
-            msh: Brick { cells, size, is_hole }.msh(&faces, volumes),
-            keys,
-            size,
-        }
-    };
+    let part =
+        |name, keys, cells, size, is_hole: &dyn Fn([usize; 3]) -> bool, volumes: &[Takes<'_>]| {
+            let faces: [Takes<'_>; 4] = [
+                ("left", &left),
+                ("bottom", &bottom),
+                ("top", &top),
+                ("skin", &skin),
+            ];
+            PartCase {
+                name,
+                msh: Brick {
+                    cells,
+                    size,
+                    is_hole,
+                }
+                .msh(&faces, volumes),
+                keys,
+                size,
+            }
+        };
     let bar = [0.04, 0.01, 0.01];
     vec![
-        part("bar", "fixed = \"left\"\ncontact = \"top\"", [6, 2, 2], bar, &solid, &[]),
+        part(
+            "bar",
+            "fixed = \"left\"\ncontact = \"top\"",
+            [6, 2, 2],
+            bar,
+            &solid,
+            &[],
+        ),
         part(
             "bar-order-2",
             "order = 2\nfixed = \"left\"\ncontact = \"skin\"",

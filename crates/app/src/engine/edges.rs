@@ -49,6 +49,10 @@ pub(super) struct Edges {
     place_of: Vec<u32>,
     /// Candidates that carried force when the faces were looked at last.
     active_then: Vec<u32>,
+    /// Whether the tool's pose is imposed: it cannot give way then.
+    is_imposed: bool,
+    /// m, how deep a point is in a face that cannot either.
+    rigid_depth: f64,
 }
 
 /// Displacements as they are known, and the part to ask for others.
@@ -80,6 +84,7 @@ impl Edges {
         near_distance: f64,
         n_candidates: usize,
         max_rows: usize,
+        is_imposed: bool,
     ) -> Self {
         Self {
             appointments: Appointments::new(&surface, clusters),
@@ -95,7 +100,14 @@ impl Edges {
             near_distance,
             surface,
             features,
+            is_imposed,
+            rigid_depth: 0.0,
         }
+    }
+
+    /// m, how deep an imposed tool is in faces that cannot give way, in the last pass.
+    pub(super) fn rigid_depth(&self) -> f64 {
+        self.rigid_depth
     }
 
     /// m: a motion of the tool in one go that no point passes the depth of a face with.

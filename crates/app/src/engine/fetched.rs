@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
 
-use glam::{DMat3, DVec3};
+use glam::DMat3;
 use once_cell::race::OnceBox;
 
 use super::clusters::Clusters;
@@ -35,12 +35,12 @@ pub(super) struct Column {
 }
 
 impl FetchedColumns {
-    /// Room for `capacity` columns.
-    pub(super) fn new(rest: &[DVec3], clusters: &Clusters, capacity: usize) -> Self {
+    /// Room for `capacity` columns of `n` candidates; the clusters may have further members, which never move.
+    pub(super) fn new(n: usize, clusters: &Clusters, capacity: usize) -> Self {
         let none = |n: usize| (0..n).map(|_| AtomicU32::new(NONE)).collect();
         Self {
-            columns: rest.iter().map(|_| OnceBox::new()).collect(),
-            arrived: none(capacity.min(rest.len())),
+            columns: (0..n).map(|_| OnceBox::new()).collect(),
+            arrived: none(capacity.min(n)),
             n_arrived: AtomicUsize::new(0),
             references: none(clusters.len()),
             is_writing: AtomicBool::new(false),
@@ -80,7 +80,15 @@ impl FetchedColumns {
         let reference = self.references[cluster].load(Ordering::Relaxed);
         let compared_with = self.columns.get(reference as usize).and_then(OnceBox::get);
         let compared_with = compared_with.map_or(&blocks, |column| &column.blocks);
-        let norms = clusters.norms_of(candidate, |i| blocks.get(i), |i| compared_with.get(i));
+        let n_compliant = self.columns.len();
+        let of = |blocks: &Blocks, i: usize| {
+            if i < n_compliant {
+                blocks.get(i)
+            } else {
+                DMat3::ZERO
+            }
+        };
+        let norms = clusters.norms_of(candidate, |i| of(&blocks, i), |i| of(compared_with, i));
         let largest = (0..self.columns.len())
             .map(|i| norm_squared(&blocks.get(i)))
             .fold(0.0, f64::max)

@@ -1,4 +1,7 @@
 //! What the step needs of a prepared part: candidates at rest and the compliance between them.
+//!
+//! Candidates that are held in all directions come last. They have no column: forces on them move nothing, and nothing
+//! moves them, but the tool meets them all the same.
 
 use std::sync::Arc;
 
@@ -16,6 +19,8 @@ use crate::stored::{Blocks, Source};
 #[derive(Debug)]
 pub struct ContactPart {
     rest: Vec<DVec3>,
+    /// Candidates with columns; those after them never move.
+    n_compliant: usize,
     columns: Columns,
     clusters: Clusters,
 }
@@ -55,19 +60,41 @@ impl ContactPart {
     /// # Panics
     /// As [`Self::new`].
     pub fn with_all(rest: Vec<DVec3>, n_rows: usize, blocks: Blocks) -> Self {
+        Self::with_all_and_held(rest, &[], n_rows, blocks)
+    }
+
+    /// As [`Self::with_all`], with further candidates at `held` (m) that never move; they have no columns, and come
+    /// after the others.
+    ///
+    /// # Panics
+    /// As [`Self::new`].
+    pub fn with_all_and_held(
+        mut rest: Vec<DVec3>,
+        held: &[DVec3],
+        n_rows: usize,
+        blocks: Blocks,
+    ) -> Self {
         assert_eq!(
             blocks.len(),
             n_rows * rest.len(),
             "compliance blocks do not fit the candidates"
         );
         assert!(n_rows >= rest.len(), "the candidates are the first rows");
-        let column = |j: usize| (j * n_rows..j * n_rows + rest.len()).map(|k| blocks.get(k));
-        let largest = (0..rest.len())
+        let n_compliant = rest.len();
+        let column = |j: usize| (j * n_rows..j * n_rows + n_compliant).map(|k| blocks.get(k));
+        let largest = (0..n_compliant)
             .map(|j| column(j).map(|c| norm_squared(&c)).fold(0.0, f64::max))
             .map(f64::sqrt)
             .collect();
+        rest.extend_from_slice(held);
         let mut clusters = Clusters::new(&rest);
-        clusters.add_all(|i, j| blocks.get(j * n_rows + i));
+        clusters.add_all(|i, j| {
+            if i.max(j) < n_compliant {
+                blocks.get(j * n_rows + i)
+            } else {
+                DMat3::ZERO
+            }
+        });
         Self {
             columns: Columns::All {
                 blocks,
@@ -76,26 +103,40 @@ impl ContactPart {
             },
             clusters,
             rest,
+            n_compliant,
         }
     }
 
     /// A part whose columns come one by one, [`Self::insert`], `capacity` of them at most. A candidate without a column
     /// cannot be touched: the step leaves it out and says so.
     pub fn with_fetched(rest: Vec<DVec3>, capacity: usize) -> Self {
-        let clusters = Clusters::new(&rest);
-        let columns = FetchedColumns::new(&rest, &clusters, capacity);
-        Self::of_fetched(rest, clusters, Arc::new(columns))
+        Self::with_fetched_and_held(rest, &[], capacity)
     }
 
-    fn of_fetched(rest: Vec<DVec3>, clusters: Clusters, columns: Arc<FetchedColumns>) -> Self {
+    /// As [`Self::with_fetched`], with further candidates at `held` (m) that never move and need no column.
+    pub fn with_fetched_and_held(mut rest: Vec<DVec3>, held: &[DVec3], capacity: usize) -> Self {
+        let n_compliant = rest.len();
+        rest.extend_from_slice(held);
+        let clusters = Clusters::new(&rest);
+        let columns = FetchedColumns::new(n_compliant, &clusters, capacity);
+        Self::of_fetched(rest, n_compliant, clusters, Arc::new(columns))
+    }
+
+    fn of_fetched(
+        rest: Vec<DVec3>,
+        n_compliant: usize,
+        clusters: Clusters,
+        columns: Arc<FetchedColumns>,
+    ) -> Self {
         Self {
             columns: Columns::Fetched {
                 columns,
-                is_taken_in: vec![false; rest.len()],
+                is_taken_in: vec![false; n_compliant],
                 n_taken_in: 0,
             },
             clusters,
             rest,
+            n_compliant,
         }
     }
 
@@ -106,7 +147,8 @@ impl ContactPart {
         };
         let clusters = Clusters::new(&self.rest);
         let columns = Arc::clone(columns);
-        Some(Self::of_fetched(self.rest.clone(), clusters, columns))
+        let rest = self.rest.clone();
+        Some(Self::of_fetched(rest, self.n_compliant, clusters, columns))
     }
 
     /// Gives a candidate its column: blocks of every row, the candidates first. From any thread, while steps are made;
@@ -118,7 +160,7 @@ impl ContactPart {
         let Columns::Fetched { columns, .. } = &self.columns else {
             panic!("this part has all its columns");
         };
-        assert!(blocks.len() >= self.rest.len(), "a column has every row");
+        assert!(blocks.len() >= self.n_compliant, "a column has every row");
         columns.insert(&self.clusters, candidate, blocks)
     }
 
@@ -141,27 +183,42 @@ impl ContactPart {
         }
     }
 
-    /// Whether the candidate's column is there.
+    /// Whether the candidate's column is there, or it needs none.
     pub fn has_column(&self, candidate: u32) -> bool {
         match &self.columns {
-            Columns::All { .. } => true,
-            Columns::Fetched { columns, .. } => columns.get(candidate as usize).is_some(),
+            Columns::Fetched { columns, .. } if !self.is_held(candidate) => {
+                columns.get(candidate as usize).is_some()
+            }
+            _ => true,
         }
+    }
+
+    /// Whether the candidate never moves.
+    #[inline]
+    pub fn is_held(&self, candidate: u32) -> bool {
+        candidate as usize >= self.n_compliant
+    }
+
+    /// Number of candidates that may move; those after them are held.
+    pub fn n_compliant(&self) -> usize {
+        self.n_compliant
     }
 
     /// Whether the candidate can be touched in this step.
     #[inline]
     pub(super) fn is_taken_in(&self, candidate: u32) -> bool {
         match &self.columns {
-            Columns::All { .. } => true,
-            Columns::Fetched { is_taken_in, .. } => is_taken_in[candidate as usize],
+            Columns::Fetched { is_taken_in, .. } if !self.is_held(candidate) => {
+                is_taken_in[candidate as usize]
+            }
+            _ => true,
         }
     }
 
     /// Number of columns that are there.
     pub fn n_columns(&self) -> usize {
         match &self.columns {
-            Columns::All { .. } => self.rest.len(),
+            Columns::All { .. } => self.n_compliant,
             Columns::Fetched { columns, .. } => columns.n_arrived(),
         }
     }
@@ -180,7 +237,7 @@ impl ContactPart {
             "one bound for each candidate"
         );
         if let Columns::All { largest, .. } = &mut self.columns {
-            largest.copy_from_slice(others);
+            largest.copy_from_slice(&others[..self.n_compliant]);
         }
         self.clusters.bound_by(others);
         self
@@ -199,11 +256,13 @@ impl ContactPart {
     /// Displacement of candidate `i` under the given contact forces, m: sum of C_ij f_j.
     #[inline]
     pub fn displacement(&self, i: usize, active: &[ActiveContact]) -> DVec3 {
+        if i >= self.n_compliant {
+            return DVec3::ZERO;
+        }
         // C_ij is C_jiᵀ: one column is read, not one place in each of many.
         let terms = || {
-            active
-                .iter()
-                .map(|c| (c.candidate as usize, c.force_on_part))
+            let moving = active.iter().filter(|c| !self.is_held(c.candidate));
+            moving.map(|c| (c.candidate as usize, c.force_on_part))
         };
         match &self.columns {
             Columns::All { blocks, stride, .. } => blocks.sum_transposed(i * stride, terms()),
@@ -216,13 +275,13 @@ impl ContactPart {
 
     /// Displacement of row `i`, which need not be a candidate's, from the columns of those that carry force, m.
     pub fn row_displacement(&self, i: usize, active: &[ActiveContact]) -> DVec3 {
-        active
-            .iter()
+        let moving = active.iter().filter(|c| !self.is_held(c.candidate));
+        moving
             .map(|c| self.at(i, c.candidate as usize) * c.force_on_part)
             .sum()
     }
 
-    /// C of row i and candidate j; zero without the column.
+    /// C of row i, which need not be a candidate's, and candidate j that may move; zero without the column.
     #[inline]
     fn at(&self, i: usize, j: usize) -> DMat3 {
         match &self.columns {
@@ -236,6 +295,9 @@ impl ContactPart {
     /// Largest Frobenius norm of a 3x3 block of a candidate's column, m/N: no candidate moves by
     /// more than this times the force on it.
     pub(super) fn largest_block(&self, candidate: u32) -> f64 {
+        if self.is_held(candidate) {
+            return 0.0;
+        }
         match &self.columns {
             Columns::All { largest, .. } => largest[candidate as usize],
             // Without a column it carries no force.
@@ -298,6 +360,9 @@ impl Deformed<'_> {
 impl ComplianceBlocks for ContactPart {
     #[inline]
     fn block(&self, row: usize, col: usize) -> DMat3 {
+        if row.max(col) >= self.n_compliant {
+            return DMat3::ZERO;
+        }
         self.at(row, col)
     }
 }

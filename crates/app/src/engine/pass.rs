@@ -11,7 +11,7 @@ use super::clock::StageClock;
 use super::edges::Positions;
 use super::part::Deformed;
 use super::scratch::Scratch;
-use super::{Engine, Stage, StepReport, state_of};
+use super::{Engine, Stage, StepReport, rigid, state_of};
 
 impl Engine {
     /// One round of proximity, planes, Delassus, LCP and update.
@@ -108,6 +108,10 @@ impl Engine {
         if let Some(late) = &mut self.late {
             report.without_column = late.sort_out(&mut self.scratch.planes, part) as u32;
         }
+        report.rigid_depth = 0.0;
+        if self.coupling.is_none() {
+            report.rigid_depth = rigid::leave_out_planes(&mut self.scratch.planes, part);
+        }
         let n_rows = self.scratch.gather(part.clusters(), self.reach_of_rotation);
         // One row for each point of the tool's edges at a face.
         if let Some(edges) = &mut self.edges {
@@ -128,6 +132,7 @@ impl Engine {
             let mut positions = Positions { deformed, known };
             let sums = self.watch.sums();
             report.dropped += edges.find(&mut positions, &pose, sums, planes, room) as u32;
+            report.rigid_depth = report.rigid_depth.max(edges.rigid_depth());
         }
         let Scratch {
             planes,
@@ -294,13 +299,23 @@ impl Engine {
             let along = row.iter().zip(&self.deviation).map(|(h, e)| h * e).sum();
             (displacement, along)
         };
+        let of_coupling = self.coupling_compliance.as_ref();
         let own_of = |plane: &Plane| {
             let i = plane.candidate as usize;
             let block = match constrained {
                 None => part.block(i, i),
                 Some(constrained) => constrained.blocks().block(i, i),
             };
-            plane.normal.dot(block * plane.normal)
+            let own = plane.normal.dot(block * plane.normal);
+            match of_coupling {
+                // Held along the normal: the tool alone gives way.
+                Some(compliance) if own <= 0.0 => {
+                    let h = plane.tool_row(reference);
+                    let yields = compliance.map(|row| row.iter().zip(&h).map(|(c, h)| c * h).sum());
+                    yields.iter().zip(&h).map(|(y, h): (&f64, _)| y * h).sum()
+                }
+                _ => own,
+            }
         };
         let loss = prune.learn(planes, z, motion_of, own_of, stride);
         report.merged_penetration = loss.penetration;

@@ -87,6 +87,9 @@ pub struct StepReport {
     pub merged_penetration: f64,
     /// Whether `merge_error` is above its tolerance.
     pub merged_badly: bool,
+    /// m: how deep a tool whose pose is imposed is in nodes or faces that are held along the contact's normal, rigid
+    /// against rigid; their forces, which nothing limits, are left out. 0 where there is none, or the tool has a coupling.
+    pub rigid_depth: f64,
     /// Passes over the contact planes (of the last stride).
     pub passes: u32,
     /// Strides in which a fast handle was followed.
@@ -126,6 +129,7 @@ impl StepReport {
             merge_error: 0.0,
             merged_penetration: 0.0,
             merged_badly: false,
+            rigid_depth: 0.0,
             passes: 0,
             strides: 0,
             pivots: 0,

@@ -13,6 +13,10 @@ use super::{ActiveContact, StepReport};
 /// Nodes whose compliance blocks are kept side by side: 42 MB of them, touched only as far as they are used.
 const MOST_PAIRS: usize = 768;
 
+/// Of each row's own compliance, what is added to it where no forces could hold a wedged tool: it then sinks in by this
+/// share of what it would give way alone.
+const GIVE: f64 = 1e-3;
+
 #[derive(Debug)]
 pub(super) struct Scratch {
     /// Planes of this pass; its capacity is the largest number of near nodes.
@@ -212,18 +216,21 @@ impl Scratch {
                 *warm = edges.is_carried(row);
             }
         }
-        let z = &mut self.z[..m];
-        let solution = lcp::Problem::trusted_symmetric(&self.w_matrix[..m * m], &self.q[..m])
-            .and_then(|problem| {
-                lcp::solve(
-                    &problem,
-                    settings,
-                    &mut self.lcp,
-                    lcp::Start::Rows(&self.warm[..m]),
-                    z,
-                    &mut self.w[..m],
-                )
+        let mut solution = self.solve_rows(m, settings);
+        if let Ok(first) = &solution
+            && matches!(first.status, lcp::Status::NoSolution | lcp::Status::Ray)
+        {
+            // Wedged between what does not give way: felt as nearly rigid, where no force at all would be an answer.
+            let is_counted = first.rounds + first.pivots;
+            report.pivots += is_counted as u32;
+            for i in 0..m {
+                self.w_matrix[i * m + i] *= 1.0 + GIVE;
+            }
+            solution = self.solve_rows(m, settings).map(|solution| lcp::Solution {
+                status: lcp::Status::NoSolution,
+                ..solution
             });
+        }
         match solution {
             Ok(solution) => {
                 report.pivots += (solution.rounds + solution.pivots) as u32;
@@ -232,11 +239,27 @@ impl Scratch {
             }
             // Only data that are not finite: no force, and the report says so.
             Err(_) => {
-                z.fill(0.0);
+                self.z[..m].fill(0.0);
                 report.certificate = f64::INFINITY;
                 report.lcp_solved = false;
             }
         }
+    }
+
+    fn solve_rows(
+        &mut self,
+        m: usize,
+        settings: &lcp::Settings,
+    ) -> Result<lcp::Solution, contact::Error> {
+        let problem = lcp::Problem::trusted_symmetric(&self.w_matrix[..m * m], &self.q[..m])?;
+        lcp::solve(
+            &problem,
+            settings,
+            &mut self.lcp,
+            lcp::Start::Rows(&self.warm[..m]),
+            &mut self.z[..m],
+            &mut self.w[..m],
+        )
     }
 
     /// Makes the LCP's answer the contact state. Nodes without a plane carry no force.

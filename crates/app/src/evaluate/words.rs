@@ -186,7 +186,7 @@ impl Story<'_> {
             PreparedCompliance::Near(demand) => format!(
                 "{kept} with the factor, {scalar} bits, {} of {} columns fetched",
                 demand.part().n_columns(),
-                demand.part().n_candidates()
+                demand.part().n_compliant()
             ),
         }
     }

@@ -64,7 +64,11 @@ impl Demand {
             factor,
             candidates: loaded.candidates.clone(),
             rows: loaded.rows.clone(),
-            part: Arc::new(ContactPart::with_fetched(rest, capacity)),
+            part: Arc::new(ContactPart::with_fetched_and_held(
+                rest,
+                &loaded.held_positions(),
+                capacity,
+            )),
             scalar,
         };
         demand.fetch(&seeds);

@@ -96,7 +96,13 @@ fn tool_meshes(folder: &Path) -> Vec<Arc<Mesh>> {
         }
         text
     };
-    let notched = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [0.0, -0.2], [-1.0, 1.0]];
+    let notched = [
+        [-1.0, -1.0],
+        [1.0, -1.0],
+        [1.0, 1.0],
+        [0.0, -0.2],
+        [-1.0, 1.0],
+    ];
     let wedge = [[-1.0, -0.3], [1.0, 0.0], [-1.0, 0.3]];
     let shapes = [
         prism(&notched, &[[0, 1, 3], [1, 2, 3], [0, 3, 4]]),
@@ -138,7 +144,11 @@ fn path(random: &mut Random, tool: &Tool, size: DVec3) -> Vec<DPose3> {
         DQuat::from_axis_angle(vector(random), random.between(-3.0, 3.0))
     };
     // Out along a direction until the tool's surface is at the place, and a little more.
-    let out = if random.chance(0.6) { DVec3::Z } else { vector(random) };
+    let out = if random.chance(0.6) {
+        DVec3::Z
+    } else {
+        vector(random)
+    };
     let at = |way: f64| DPose3::from_parts(lands_at + way * out, rotation);
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..40 {
@@ -236,6 +246,7 @@ fn check_nodes(engine: &mut Engine, report: &StepReport, mesh: &PartMesh) -> Res
     let is_exact = report.lcp_solved
         && report.converged
         && report.dropped == 0
+        && report.rigid_depth == 0.0
         && report.without_column == 0
         && report.rows == report.near
         && engine.settings().contact_iterations == ContactIterations::Converged;
@@ -311,7 +322,7 @@ fn random_tools_on_random_ways_never_panic_and_leave_no_node_inside() {
     let meshes = tool_meshes(folder.path());
     let mut n_touched = 0;
     let mut n_runs = 0;
-    for_each_seed(2000, |_, random| {
+    for_each_seed(300, |_, random| {
         let which = random.below(ready.len());
         let touched = run(random, &ready[which], &meshes)
             .map_err(|why| format!("{}: {why}", ready[which].name))?;
@@ -319,5 +330,8 @@ fn random_tools_on_random_ways_never_panic_and_leave_no_node_inside() {
         n_touched += u32::from(touched > 0);
         Ok(())
     });
-    assert!(n_touched > n_runs / 3, "contact in {n_touched} of {n_runs} runs");
+    assert!(
+        n_touched > n_runs / 3,
+        "contact in {n_touched} of {n_runs} runs"
+    );
 }

@@ -66,9 +66,21 @@ fn scene(random: &mut Random, case: &PartCase) -> String {
     let holds_part = random.chance(0.3);
     let [x, y, z] = case.size;
     // Some start in the part, which has to be refused.
-    let above = if random.chance(0.9) { reach(&tool) } else { 0.3 * reach(&tool) };
-    let above = if tool.contains("half-space") { 1e-4 } else { above };
-    let position = [x * random.unit(), y * random.unit(), z + above + random.decades(1e-6, 1e-3)];
+    let above = if random.chance(0.9) {
+        reach(&tool)
+    } else {
+        0.3 * reach(&tool)
+    };
+    let above = if tool.contains("half-space") {
+        1e-4
+    } else {
+        above
+    };
+    let position = [
+        x * random.unit(),
+        y * random.unit(),
+        z + above + random.decades(1e-6, 1e-3),
+    ];
     let axis = if tool.contains("half-space") {
         [0.0, 0.0, -1.0]
     } else if random.chance(0.5) {
@@ -102,7 +114,14 @@ fn run(folder: &Path, seed: u64, text: &str) -> Result<bool, String> {
     std::fs::write(&path, text).unwrap();
     let out = folder.join(format!("result-{seed}"));
     let cache = folder.join("cache");
-    let outcome = snapin(&["run", arg(&path), "--out", arg(&out), "--cache", arg(&cache)]);
+    let outcome = snapin(&[
+        "run",
+        arg(&path),
+        "--out",
+        arg(&out),
+        "--cache",
+        arg(&cache),
+    ]);
     let left = std::fs::read_dir(folder).unwrap();
     let half = left
         .map(|entry| entry.unwrap().file_name())
@@ -134,5 +153,8 @@ fn random_scenes_end_with_a_result_or_a_refusal() {
         n_done += u32::from(run(folder.path(), seed, &text)?);
         Ok(())
     });
-    assert!(n_done > n_runs / 2, "{n_done} of {n_runs} scenes had a result");
+    assert!(
+        n_done > n_runs / 2,
+        "{n_done} of {n_runs} scenes had a result"
+    );
 }

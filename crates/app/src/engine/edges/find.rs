@@ -8,6 +8,7 @@ use glam::DVec3;
 use glamx::DPose3;
 
 use super::super::ActiveContact;
+use super::super::rigid::leave_out_rows;
 use super::super::watch::Sums;
 use super::{Edges, Positions};
 
@@ -67,6 +68,9 @@ impl Edges {
             let has_columns =
                 |row: &FaceRow| row.shares().iter().all(|(c, _)| part.is_taken_in(*c));
             self.rows.retain(has_columns);
+        }
+        if self.is_imposed {
+            self.rigid_depth = leave_out_rows(&mut self.rows, part);
         }
         self.memory.remember(&self.rows);
         self.list_involved(positions, planes);

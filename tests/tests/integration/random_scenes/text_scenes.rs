@@ -146,7 +146,7 @@ fn random_scenes_end_with_a_result_or_a_refusal() {
         std::fs::write(folder.path().join(mesh), &case.msh).unwrap();
     }
     let (mut n_runs, mut n_done) = (0, 0);
-    for_each_seed(200, |seed, random| {
+    for_each_seed(40, |seed, random| {
         let case = &parts[random.below(parts.len())];
         let text = scene(random, case);
         n_runs += 1;

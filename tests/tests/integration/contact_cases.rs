@@ -1,0 +1,183 @@
+//! Scenes in which contact was missed, met in the air, or ended the program, each with what is right.
+//!
+//! Numbers: a block as stiff as these gives way by less than a thousandth of the hand (2000 N/m) and the coupling (1e4
+//! N/m), so that the force is the hand's: a millimetre of travel less the way to the first touch, with the hand's
+//! damping, 2.10 to 2.15 N. Beside them stand a tool without edges or a block of E = 1e14 Pa, which take other ways
+//! through the program.
+
+use std::path::Path;
+
+use serde_json::Value;
+use snapin_tests::{Outcome, arg, root, snapin};
+
+/// A scene on a mesh of `tests/data/contact`, pushed down by 1 mm at 20 mm/s.
+fn scene(mesh: &str, part: &str, tool: &str, more: &str) -> String {
+    let mesh = root().join("tests/data/contact").join(mesh);
+    format!(
+        "[part]\nmesh = {mesh:?}\n{part}\nmaterial = {{ young_modulus = 2.7e9, poisson_ratio = 0.35 }}\n\n\
+         [tool]\n{tool}\n\n[hand]\ndirection = [0, 0, -1]\nspeed = 0.02\ntravel = 0.001\n\n\
+         [output]\nframes = 0\n{more}\n"
+    )
+}
+
+fn run_text(folder: &Path, text: &str) -> (Outcome, Value) {
+    let path = folder.join("scene.toml");
+    std::fs::write(&path, text).unwrap();
+    let out = folder.join("result");
+    let cache = folder.join("cache");
+    let outcome = snapin(&[
+        "run",
+        arg(&path),
+        "--out",
+        arg(&out),
+        "--cache",
+        arg(&cache),
+    ]);
+    let summary = std::fs::read_to_string(out.join("summary.json")).unwrap_or_default();
+    let summary = serde_json::from_str(&summary).unwrap_or(Value::Null);
+    (outcome, summary)
+}
+
+/// Peak force, N, and travel of the tool there, mm.
+fn peak(text: &str) -> (f64, f64) {
+    let folder = tempfile::tempdir().unwrap();
+    let (outcome, summary) = run_text(folder.path(), text);
+    assert_eq!(outcome.code, 0, "{}\n{text}", outcome.err);
+    let number = |key: &str| summary[key].as_f64().unwrap();
+    (
+        number("peak_insertion_force_N"),
+        1e3 * number("travel_at_peak_m"),
+    )
+}
+
+fn assert_peak(text: &str, force: f64, travel: f64) {
+    let (f, t) = peak(text);
+    let is_near = (f - force).abs() < 0.003 && (t - travel).abs() < 0.002;
+    assert!(
+        is_near,
+        "{f} N at {t} mm for {force} N at {travel} mm\n{text}"
+    );
+}
+
+const FIXED: &str = "fixed = \"fixed\"\ncontact = \"contact\"";
+
+/// Tools with edges that are all beyond the part, and their like without edges.
+#[test]
+fn a_tool_larger_than_the_contact_faces_is_felt() {
+    let block = |tool: &str, more: &str| scene("block.msh", FIXED, tool, more);
+    let cube =
+        "shape = \"box\"\nhalf_extents = [0.005, 0.004, 0.01]\nposition = [0.002, 0.002, 0.0152]";
+    let tube =
+        "shape = \"cylinder\"\nradius = 0.01\nposition = [0.002, 0.002, 0.0152]\naxis = [1, 0, 0]";
+    let finite = format!("{tube}\nhalf_length = 0.004");
+    for (tool, like) in [(cube, None), (finite.as_str(), Some(tube))] {
+        let (f, t) = peak(&block(tool, ""));
+        let plain = like.map_or_else(
+            || peak(&block(tool, "[accuracy]\ntool_features = \"off\"")),
+            |like| peak(&block(like, "")),
+        );
+        assert!(
+            (f - plain.0).abs() < 1e-6 && (t - plain.1).abs() < 1e-6,
+            "{f} {t} {plain:?}"
+        );
+        assert!(f > 2.0, "{f}");
+        for keys in [
+            "near_distance = 0.005",
+            "max_contacts = 1",
+            "max_contacts = 2\norder = 2",
+        ] {
+            let (f, _) = peak(&block(tool, &format!("[accuracy]\n{keys}")));
+            assert!(f > 2.0, "{keys}: {f}");
+        }
+    }
+}
+
+#[test]
+fn finite_tools_larger_than_the_shipped_clip_run_to_their_end() {
+    let clip = std::fs::read_to_string(root().join("scenes/clip.toml")).unwrap();
+    let mesh = root().join("scenes/clip.msh");
+    let clip = clip.replace("\"clip.msh\"", &format!("{mesh:?}"));
+    let whole = peak(&clip);
+    // Beyond the clip on both sides: nothing of its edges touches. Then with its ends level with the clip's.
+    let with_length = |half_length: &str| {
+        let radius = "radius = 0.010";
+        assert!(clip.contains(radius));
+        clip.replace(radius, &format!("{radius}\nhalf_length = {half_length}"))
+    };
+    let (f, t) = peak(&with_length("0.03"));
+    assert!(
+        (f - whole.0).abs() < 1e-6 * whole.0 && (t - whole.1).abs() < 1e-6,
+        "{f} {t} {whole:?}"
+    );
+    assert!(peak(&with_length("0.005")).0 > 0.9 * whole.0);
+    let flat =
+        "shape = \"box\"\nhalf_extents = [0.03, 0.005, 0.03]\nposition = [0.0, 0.0127, 0.005]";
+    let part = format!("mesh = {mesh:?}\n{FIXED}");
+    let hand = "direction = [0, -1, 0]\nspeed = 0.02\ntravel = 0.006";
+    let text = format!(
+        "[part]\n{part}\nmaterial = {{ young_modulus = 2.7e9, poisson_ratio = 0.35 }}\n[tool]\n{flat}\n[hand]\n{hand}\n\
+         [output]\nframes = 0\n"
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let (outcome, summary) = run_text(folder.path(), &text);
+    assert_eq!(outcome.code, 0, "{}", outcome.err);
+    assert!(summary["peak_insertion_force_N"].as_f64().unwrap() > 1.0);
+}
+
+/// The left half of the bar is held and named as contact. What to expect: 2.1419 N at 0.2001 mm, a block of 1e14 Pa.
+#[test]
+fn held_nodes_stop_every_tool() {
+    let part = "fixed = \"root\"\ncontact = \"contact\"";
+    let ball = "shape = \"sphere\"\nradius = 0.005\nposition = [0.01, 0.005, 0.0092]";
+    let bar = |tool: &str, more: &str| scene("half-held-bar.msh", part, tool, more);
+    assert_peak(&bar(ball, ""), 2.142, 0.200);
+    for keys in ["columns = \"near\"", "order = 2", "adaptive = 0.002"] {
+        assert_peak(&bar(ball, &format!("[accuracy]\n{keys}")), 2.142, 0.200);
+    }
+    // The next nodes are 0.6 mm from where the ball is lowest: it comes to lie between them.
+    let (f, t) = peak(&bar(ball, "[accuracy]\norder = 3"));
+    assert!(
+        (f - 2.142).abs() < 0.02 && (t - 0.2).abs() < 0.6 * 0.6 / (2.0 * 5.0) + 0.01,
+        "{f} {t}"
+    );
+    let constrain = "[accuracy]\norder = 2\nadaptive = { method = \"constrain\", radius = 0.002 }";
+    assert_peak(&bar(ball, constrain), 2.142, 0.200);
+    let capsule = "shape = \"capsule\"\nradius = 0.002\nhalf_length = 0.002\nposition = [0.008, 0.005, 0.0062]\n\
+                   axis = [1, 0, 0]";
+    let tube =
+        "shape = \"cylinder\"\nradius = 0.005\nposition = [0.01, 0.005, 0.0092]\naxis = [0, 1, 0]";
+    for tool in [capsule, tube] {
+        assert_peak(&bar(tool, ""), 2.142, 0.200);
+        assert_peak(
+            &bar(tool, "[accuracy]\nrates = { every = 2 }\n"),
+            2.142,
+            0.200,
+        );
+    }
+    let by_part = bar(ball, "[holds]\nhandle = \"part\"").replace("[0, 0, -1]", "[0, 0, 1]");
+    // The hand holds the part beside the line of the force: its wrist gives way a little, too.
+    let (f, t) = peak(&by_part);
+    assert!(
+        (f - 2.142).abs() < 0.01 && (t - 0.2).abs() < 0.02,
+        "{f} N at {t} mm"
+    );
+    // Where it gives way the force is less, and it goes deeper.
+    let on_free = ball.replace("[0.01,", "[0.03,");
+    let (f, t) = peak(&bar(&on_free, ""));
+    assert!(f < 2.141 && t > 0.2, "{f} N at {t} mm");
+}
+
+#[test]
+fn nodes_of_no_element_are_air_and_told() {
+    let ball = "shape = \"sphere\"\nradius = 0.02\nposition = [0.01, 0.005, 0.0351]";
+    let text = scene("stray-face.msh", FIXED, ball, "");
+    let folder = tempfile::tempdir().unwrap();
+    let (outcome, summary) = run_text(folder.path(), &text);
+    assert_eq!(outcome.code, 0, "{}", outcome.err);
+    assert_eq!(summary["peak_insertion_force_N"], 0.0);
+    assert!(
+        outcome.err.contains("3 of") && outcome.err.contains("\"contact\" are in no element"),
+        "{}",
+        outcome.err
+    );
+}

@@ -18,6 +18,7 @@ pub mod fields;
 mod follow;
 mod free_nodes;
 pub mod interrupt;
+mod leftovers;
 pub mod machine;
 mod output;
 pub mod prepare;

@@ -94,21 +94,14 @@ impl Memory {
             gpu_s: compared.gpu_s,
             difference: compared.difference,
         };
-        let partial = self
-            .file
-            .with_extension(format!("partial-{}", std::process::id()));
-        let written = serde_json::to_vec_pretty(&kept)
+        let _ = serde_json::to_vec_pretty(&kept)
             .map_err(io::Error::from)
             .and_then(|text| {
                 if let Some(folder) = self.file.parent() {
                     fs::create_dir_all(folder)?;
                 }
-                fs::write(&partial, text)?;
-                fs::rename(&partial, &self.file)
+                crate::leftovers::write_beside(&self.file, &text)
             });
-        if written.is_err() {
-            let _ = fs::remove_file(&partial);
-        }
     }
 }
 

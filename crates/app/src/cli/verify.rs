@@ -7,6 +7,7 @@ use clap::Args;
 
 use super::{json_text, print};
 use crate::Error;
+use crate::leftovers::write_beside;
 use crate::progress::Ui;
 use crate::study::verify::{CaseResult, Status, find_cases, run_case, to_json};
 
@@ -58,7 +59,8 @@ pub(super) fn run(args: &VerifyArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result
     }
     let value = to_json(&results);
     if let Some(file) = &args.out {
-        write_beside(file, json_text(&value).as_bytes())?;
+        write_beside(file, json_text(&value).as_bytes())
+            .map_err(Error::io(file, "write the computed values"))?;
     }
     if args.json {
         print(out, &json_text(&value))?;
@@ -70,15 +72,6 @@ pub(super) fn run(args: &VerifyArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result
         )?;
     }
     Ok(u8::from(results.iter().any(|r| r.status != Status::Ok)))
-}
-
-fn write_beside(file: &std::path::Path, bytes: &[u8]) -> Result<(), Error> {
-    let partial = file.with_extension(format!("partial-{}", std::process::id()));
-    let written = std::fs::write(&partial, bytes).and_then(|()| std::fs::rename(&partial, file));
-    if written.is_err() {
-        let _ = std::fs::remove_file(&partial);
-    }
-    written.map_err(Error::io(file, "write the computed values"))
 }
 
 fn table(result: &CaseResult) -> String {

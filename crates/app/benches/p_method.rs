@@ -83,7 +83,7 @@ fn variant(mesh: &str, name: &str, order: u8, adaptive: Adaptive) -> Variant {
     let ui = Ui::new(&mut unseen, false);
     let options = PrepareOptions {
         cache_dir: cache::default_dir(),
-        rebuild: false,
+        ..PrepareOptions::default()
     };
     let prepared = prepare(&setup::part_spec(&scene).unwrap(), &options, &ui).unwrap();
     let (tool, _) = setup::tool(&scene).unwrap();

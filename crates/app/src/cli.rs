@@ -2,6 +2,7 @@
 //! exit codes meet here: 0 done, 1 result out of tolerance, 2 usage or input error, 70 a fault of the program, 130 Ctrl-C.
 
 mod accuracy;
+mod cache;
 mod doctor;
 mod prepare;
 mod run;
@@ -13,7 +14,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
-use crate::prepare::{PrepareOptions, cache};
+use crate::prepare::PrepareOptions;
+use crate::prepare::cache::{default_dir, shelf::Limit};
 use crate::progress::Ui;
 use crate::{Error, crash};
 
@@ -33,6 +35,8 @@ enum Command {
     Accuracy(accuracy::AccuracyArgs),
     /// Build or check the cached part of a scene; print sizes, times and checks.
     Prepare(prepare::PrepareArgs),
+    /// List or clear prepared parts.
+    Cache(cache::ShowCacheArgs),
     /// Compare with reference cases: every folder below DIR with case.toml or problem.json.
     Verify(verify::VerifyArgs),
     /// Show the keys of a scene file as JSON Schema or as Markdown.
@@ -61,16 +65,43 @@ struct CacheArgs {
     /// Neither read nor write prepared parts.
     #[arg(long, conflicts_with = "cache")]
     no_cache: bool,
+    /// What the folder may hold, such as 500MB or none (default: SNAPIN_CACHE_LIMIT, else 2GB); what was not
+    /// used for the longest time goes first.
+    #[arg(long, value_name = "SIZE")]
+    cache_limit: Option<Limit>,
 }
 
 impl CacheArgs {
-    fn options(&self, rebuild: bool) -> PrepareOptions {
+    /// # Errors
+    /// SNAPIN_CACHE_LIMIT that is no size.
+    fn options(&self, rebuild: bool) -> Result<PrepareOptions, Error> {
         let cache_dir = if self.no_cache {
             None
         } else {
-            self.cache.clone().or_else(cache::default_dir)
+            self.cache.clone().or_else(default_dir)
         };
-        PrepareOptions { cache_dir, rebuild }
+        Ok(PrepareOptions {
+            cache_dir,
+            rebuild,
+            cache_limit: limit_or_default(self.cache_limit)?,
+        })
+    }
+}
+
+/// The bound of the cache: as given, else from the environment, else the default.
+///
+/// # Errors
+/// SNAPIN_CACHE_LIMIT that is no size.
+fn limit_or_default(given: Option<Limit>) -> Result<Limit, Error> {
+    const NAME: &str = "SNAPIN_CACHE_LIMIT";
+    let of_environment = || std::env::var_os(NAME).filter(|value| !value.is_empty());
+    match (given, of_environment()) {
+        (Some(limit), _) => Ok(limit),
+        (None, None) => Ok(Limit::default()),
+        (None, Some(value)) => value
+            .to_string_lossy()
+            .parse()
+            .map_err(|why| Error::Input(format!("{NAME}: {why}"))),
     }
 }
 
@@ -107,6 +138,7 @@ fn command(
         Command::Run(args) => run::run(args, out, &ui),
         Command::Accuracy(args) => accuracy::run(args, out, &ui),
         Command::Prepare(args) => prepare::run(args, out, &ui),
+        Command::Cache(args) => cache::run(args, out),
         Command::Verify(args) => verify::run(args, out, &ui),
         Command::Scene(args) => show_scene_keys(args, out),
         Command::Doctor(args) => doctor::run(args, out),

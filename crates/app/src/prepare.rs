@@ -119,6 +119,8 @@ pub struct PrepareOptions {
     pub cache_dir: Option<PathBuf>,
     /// Ignore what is cached and write it anew.
     pub rebuild: bool,
+    /// What the folder may hold; beyond it, parts that were not used for the longest time go.
+    pub cache_limit: cache::shelf::Limit,
 }
 
 /// A part that is read, held and checked, before its compliance is known.
@@ -453,6 +455,7 @@ fn compliance_of(
         match cache::read(file, &key, loaded.candidates.len(), loaded.rows.len()) {
             Ok(Some((compliance, checks))) => {
                 seconds.push(("read the cache", reading.elapsed().as_secs_f64()));
+                cache::shelf::make_room(file, None, options.cache_limit, ui);
                 let compliance = PreparedCompliance::All(compliance);
                 return Ok((compliance, checks, Cached::Read(file.clone())));
             }
@@ -473,6 +476,8 @@ fn compliance_of(
     seconds.extend(stages);
     let mut cached = Cached::No;
     if let Some(file) = cache_file {
+        let coming = cache::size_of_file(loaded.candidates.len(), loaded.rows.len());
+        cache::shelf::make_room(&file, Some(coming), options.cache_limit, ui);
         match cache::write(&file, &key, &compliance, &checks) {
             Ok(()) => {
                 // From the file on, so that large parts are in memory once and can be given back to it.

@@ -111,6 +111,130 @@ fn ctrl_c_ends_with_130_and_keeps_the_earlier_result() {
     assert_eq!(left, 0, "nothing half-written is left");
 }
 
+#[cfg(unix)]
+fn names(dir: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(dir).unwrap();
+    entries
+        .map(|e| e.unwrap().file_name().to_string_lossy().into_owned())
+        .collect()
+}
+
+/// Begins a run that lasts a second and kills it, without any warning, while its folder is in the making.
+#[cfg(unix)]
+fn kill_a_run(dir: &Path, out: &str) {
+    let mut child = snapin(dir)
+        .args([
+            "run",
+            scene().to_str().unwrap(),
+            "--real-time",
+            "--out",
+            out,
+        ])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let mark = format!("partial-{}", child.id());
+    while !names(dir).iter().any(|name| name.ends_with(&mark)) {
+        assert!(child.try_wait().unwrap().is_none(), "it ended too early");
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(
+        names(dir).iter().any(|name| name.ends_with(&mark)),
+        "a killed run leaves its folder"
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn leftovers_of_a_killed_run_are_swept_at_the_next_start_and_own_files_survive() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = scene();
+    let run_into = |out: &str| {
+        let output = run(dir.path(), &["run", scene.to_str().unwrap(), "--out", out]);
+        let err = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(0), "{err}");
+    };
+    let leftovers = || {
+        let mut all = names(dir.path());
+        all.retain(|name| name.contains("partial") || name.contains(".old"));
+        all
+    };
+    kill_a_run(dir.path(), "out");
+    run_into("out");
+    assert_eq!(leftovers(), [""; 0]);
+
+    let out = dir.path().join("out");
+    std::fs::write(out.join("notes.txt"), "mine").unwrap();
+    std::fs::write(out.join("frames/mine.png"), "mine").unwrap();
+    kill_a_run(dir.path(), "out");
+    let own =
+        || ["notes.txt", "frames/mine.png"].map(|f| std::fs::read_to_string(out.join(f)).unwrap());
+    assert_eq!(own(), ["mine", "mine"]);
+    // Another result in the same place, while one is being made: what is being made stays.
+    let mut child = snapin(dir.path())
+        .args([
+            "run",
+            scene.to_str().unwrap(),
+            "--real-time",
+            "--out",
+            "slow",
+        ])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let mark = format!(".slow.partial-{}", child.id());
+    while !names(dir.path()).contains(&mark) {
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    run_into("other");
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+    assert!(dir.path().join("slow/report.html").is_file());
+    run_into("out");
+    assert_eq!(own(), ["mine", "mine"]);
+    assert!(out.join("report.html").is_file());
+    assert_eq!(leftovers(), [""; 0]);
+}
+
+/// Two programs in one cache whose bound leaves room for neither's part beside the other: both end well, again and again.
+#[test]
+fn two_programs_share_a_cache_that_is_too_small() {
+    let dir = tempfile::tempdir().unwrap();
+    let hook = scene().with_file_name("hook.toml");
+    let start = |scene: &Path| {
+        snapin(dir.path())
+            .args(["prepare", scene.to_str().unwrap()])
+            .env("SNAPIN_CACHE_LIMIT", "0")
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap()
+    };
+    for _ in 0..3 {
+        let both = [start(&scene()), start(&hook)];
+        for child in both {
+            let output = child.wait_with_output().unwrap();
+            let err = String::from_utf8_lossy(&output.stderr);
+            assert_eq!(output.status.code(), Some(0), "{err}");
+            assert!(!err.contains("damaged") && !err.contains("cannot"), "{err}");
+        }
+    }
+    let wrong = snapin(dir.path())
+        .args(["prepare", scene().to_str().unwrap()])
+        .env("SNAPIN_CACHE_LIMIT", "much")
+        .output()
+        .unwrap();
+    assert_eq!(wrong.status.code(), Some(2));
+    let err = String::from_utf8_lossy(&wrong.stderr);
+    assert!(
+        err.contains("SNAPIN_CACHE_LIMIT: \"much\" is no size"),
+        "{err}"
+    );
+}
+
 /// Without any driver "gpu" is refused with what was looked for, "auto" runs on the processor and says so, and so does
 /// the doctor.
 #[test]

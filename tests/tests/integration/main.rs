@@ -5,6 +5,7 @@
 mod accuracy;
 mod architecture;
 mod bad_input;
+mod cache;
 mod contact_cases;
 mod docs;
 mod fast_path;

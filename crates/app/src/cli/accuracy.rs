@@ -67,7 +67,7 @@ pub(super) fn run(args: &AccuracyArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Resu
         timed_s: args.quick.then_some(0.1),
         fresh: args.fresh,
     };
-    let study = accuracy::run(&scene, &options, &args.cache.options(false), ui);
+    let study = accuracy::run(&scene, &options, &args.cache.options(false)?, ui);
     ui.end_status();
     let study = match study {
         Err(e) if e.is_interrupt() => {

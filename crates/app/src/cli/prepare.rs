@@ -31,7 +31,7 @@ pub(super) struct PrepareArgs {
 
 pub(super) fn run(args: &PrepareArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u8, Error> {
     let scene = Scene::load(&args.scene)?;
-    let options = args.cache.options(args.rebuild);
+    let options = args.cache.options(args.rebuild)?;
     let (scene, picked) = resolved(scene, &options, ui)?;
     picked.iter().for_each(|line| ui.note(line));
     let prepared = prepare(&setup::part_spec(&scene)?, &options, ui)?;

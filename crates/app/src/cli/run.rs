@@ -44,7 +44,7 @@ pub(super) fn run(args: &RunArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u8
     // Whether the result can be written is known before an hour of preparing.
     let staging = Staging::new(&target)?;
 
-    let options = args.cache.options(false);
+    let options = args.cache.options(false)?;
     let (scene, picked) = resolved(scene, &options, ui)?;
     let (tool, remarks) = setup::tool(&scene)?;
     picked.iter().for_each(|line| ui.note(line));

@@ -4,14 +4,19 @@
 //! Layout, little-endian: magic (8 bytes), format (u32), scalar bytes (u32), key (32 bytes),
 //! candidates and rows (u64 each), checks (3 x f64), 3x3 blocks (f64) of the candidates' rows, which the step reads,
 //! then of the rows that are only drawn, BLAKE3 of all before (32). Numbers lie at multiples of 8: the file is mapped,
-//! not copied.
+//! not copied. While a file is in use, a lock on it is shared; its time of change is that of its last use, which is what
+//! [`shelf`] keeps the folder within its bound by.
 
-use std::fs;
+pub mod shelf;
+
+use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use fem::{Compliance, ComplianceChecks};
 
+use crate::leftovers;
 use crate::stored::{Mapped, Source, StoredCompliance, sections};
 
 /// Changes whenever the meaning of the file or the numbers in it changes.
@@ -71,7 +76,7 @@ pub fn read(
     n_rows: usize,
 ) -> Result<Option<(StoredCompliance, ComplianceChecks)>, Damage> {
     let unreadable = |e: io::Error| Damage::Unreadable(e.to_string());
-    let opened = match fs::File::open(file) {
+    let opened = match File::open(file) {
         Ok(opened) => opened,
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
         Err(e) => return Err(unreadable(e)),
@@ -79,7 +84,8 @@ pub fn read(
     if opened.metadata().map_err(unreadable)?.len() < (HEADER + CHECKSUM) as u64 {
         return Err(Damage::Length);
     }
-    let map = Mapped::open(&opened).map_err(unreadable)?;
+    mark_as_used(file, &opened);
+    let map = Mapped::open(opened).map_err(unreadable)?;
     let (body, checksum) = map.split_at(map.len() - CHECKSUM);
     // All bytes are in memory afterwards: no step waits for the disk.
     if blake3::Hasher::new()
@@ -121,10 +127,27 @@ pub fn read(
     Ok(Some((stored, checks)))
 }
 
+/// Tells other programs that the file is in use, and since when. A folder that cannot be written into, or has no locks,
+/// is no reason not to read.
+fn mark_as_used(file: &Path, opened: &File) {
+    let _ = opened.try_lock_shared();
+    let now = SystemTime::now();
+    if opened.set_modified(now).is_err()
+        && let Ok(to_write) = File::options().append(true).open(file)
+    {
+        let _ = to_write.set_modified(now);
+    }
+}
+
+/// Bytes of a part's file.
+pub fn size_of_file(n_candidates: usize, n_rows: usize) -> u64 {
+    72 * n_candidates as u64 * n_rows as u64 + (HEADER + CHECKSUM) as u64
+}
+
 /// Writes a part beside its place and renames it.
 ///
 /// # Errors
-/// What the system says; nothing half-written is left.
+/// What the system says; nothing half-written is left. A link in its place is left alone.
 pub fn write(
     file: &Path,
     key: &[u8; 32],
@@ -134,7 +157,10 @@ pub fn write(
     if let Some(dir) = file.parent() {
         fs::create_dir_all(dir)?;
     }
-    let partial = file.with_extension(format!("partial-{}", std::process::id()));
+    if file.is_symlink() {
+        return Err(io::Error::other("a link is in its place"));
+    }
+    let partial = file.with_extension(leftovers::mark());
     let result =
         write_to(&partial, key, compliance, checks).and_then(|()| fs::rename(&partial, file));
     if result.is_err() {
@@ -158,7 +184,9 @@ fn write_to(
         head.extend(number.to_le_bytes());
     }
     let mut hash = blake3::Hasher::new();
-    let mut out = io::BufWriter::with_capacity(1 << 20, fs::File::create(partial)?);
+    let file = File::create(partial)?;
+    leftovers::lock(&file);
+    let mut out = io::BufWriter::with_capacity(1 << 20, file);
     let (contact, drawn) = sections(compliance);
     let columns = contact.into_iter().chain(drawn).map(bytemuck::cast_slice);
     for bytes in std::iter::once(head.as_slice()).chain(columns) {

@@ -5,9 +5,11 @@
 //! program's own or a file, and each step is timed. Finished settings are kept in files, so that an
 //! interrupted study goes on where it was.
 
+mod busy;
 mod compare;
 mod measure;
 mod page;
+mod peak;
 mod pick;
 mod point;
 mod store;
@@ -17,6 +19,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+pub use busy::Repeats;
 pub use compare::{Errors, Reference};
 pub use measure::{Measured, Times};
 pub use page::write;
@@ -90,8 +93,14 @@ pub struct Study {
     pub rows: Vec<Row>,
     /// What was compared with.
     pub reference: Reference,
-    /// N and m: the reference's peak.
+    /// N and m: the reference's snap, or its largest force where it does not snap.
     pub peak: (f64, f64),
+    /// Whether it snaps.
+    pub is_snap: bool,
+    /// Programs that wanted a core when the study began, as the system counts them; 0 where it does not.
+    pub load: f64,
+    /// Cores.
+    pub cores: usize,
     /// Curves of force (N) over travel (m) for the plot, the reference first.
     pub curves: Vec<(String, Vec<(f64, f64)>)>,
     /// Settings whose curve is beyond that plot, with their peaks (N).
@@ -115,6 +124,7 @@ pub fn run(
     prepare: &PrepareOptions,
     ui: &Ui<'_>,
 ) -> Result<Study, Error> {
+    let load_average = sysinfo::System::load_average().one;
     let mut scene = scene.clone();
     scene.accuracy.budget_us = None;
     let own_order = store::own_order(&scene)?;
@@ -143,7 +153,7 @@ pub fn run(
     };
     let folder = options.out.join("points");
     if options.fresh {
-        let _ = std::fs::remove_dir_all(&folder);
+        store::forget(&folder);
     }
     let mut runner = Runner {
         store: Store::new(&folder, &identity)?,
@@ -218,20 +228,28 @@ pub fn run(
     let is_curve = |r: &&Row| r.axis == Axis::Order || (r.axis == Axis::Mesh && !r.is_own);
     for row in rows.iter().filter(is_curve) {
         if let Ok((measured, _)) = &row.outcome {
-            let (peak, _) = scales.peak(&measured.wrench);
-            if peak > OFF_SCALE * scales.peak(&reference.wrench).0 {
-                off_scale.push((row.label.clone(), peak));
+            let largest = scales.largest(&measured.wrench);
+            if largest > OFF_SCALE * scales.largest(&reference.wrench) {
+                off_scale.push((row.label.clone(), largest));
             } else {
                 curves.push((row.label.clone(), curve(&measured.wrench)));
             }
         }
     }
+    let machine = Machine::read();
+    let peak = scales.peak(&reference.wrench);
     Ok(Study {
         title: scene.title.clone(),
         scene_path: scene.path.display().to_string(),
         own: scene.accuracy.words(),
-        machine: Machine::read().summary(),
-        peak: scales.peak(&reference.wrench),
+        machine: machine.summary(),
+        peak: (
+            peak.force,
+            scales.travel_at(peak.at, reference.wrench.len()),
+        ),
+        is_snap: peak.is_snap,
+        load: load_average,
+        cores: machine.cores,
         rows,
         reference,
         curves,
@@ -420,7 +438,8 @@ fn can_be_prepared(setting: &Setting, limit_s: f64) -> Result<bool, Error> {
     Ok(forecast.seconds < limit_s && forecast.refuse_what_cannot_fit(&loaded).is_ok())
 }
 
-/// A folder that results may be written into: new, empty, or of an earlier study.
+/// A folder that results may be written into: new, empty, or of an earlier study, finished or not. Files of the user in
+/// it stay.
 ///
 /// # Errors
 /// A file, or a folder that holds something else.
@@ -437,8 +456,15 @@ pub fn check_folder(out: &Path) -> Result<(), Error> {
     let Ok(mut entries) = std::fs::read_dir(out) else {
         return Ok(());
     };
-    let is_ours = out.join("points").is_dir();
-    if entries.next().is_some() && !is_ours {
+    let points = out.join("points");
+    let is_begun = || {
+        let mut all = std::fs::read_dir(out).into_iter().flatten().flatten();
+        points.is_dir()
+            && std::fs::read_dir(&points).is_ok_and(|mut p| p.next().is_none())
+            && all.all(|entry| entry.file_name() == "points")
+    };
+    let is_ours = || !store::points_in(&points).is_empty() || page::is_written_in(out);
+    if entries.next().is_some() && !is_ours() && !is_begun() {
         return refuse("holds files that are no result of `snapin accuracy`, so it is left alone");
     }
     Ok(())

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::measure::Measured;
+use super::peak::{Peak, snap};
 
 /// How far a setting is from the reference. `None`: not comparable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -14,10 +15,11 @@ pub struct Errors {
     pub solver_l2: f64,
     /// Largest difference of the wrench over the largest of the reference.
     pub wrench_max: f64,
-    /// (peak - peak_ref) / peak_ref of the force along the approach.
-    pub peak: f64,
+    /// (peak - peak_ref) / peak_ref of the force along the approach, at the snap, or at the largest force where
+    /// neither snaps; `None` if only one of them snaps.
+    pub peak: Option<f64>,
     /// m, travel of the handle at the peak, minus that of the reference.
-    pub peak_travel: f64,
+    pub peak_travel: Option<f64>,
     /// ‖u - u_ref‖ / ‖u_ref‖ of the drawn displacement where the part can touch.
     pub displacement: Option<f64>,
     /// sqrt(2 |Π - Π_ref|) / sqrt(2 Π_ref) at the peak of the reference's energy.
@@ -66,15 +68,20 @@ impl Scales {
         -(0..3).map(|c| wrench[c] * self.direction[c]).sum::<f64>()
     }
 
-    /// N, m: largest resistance and the handle's travel there.
-    pub(super) fn peak(&self, wrenches: &[[f64; 6]]) -> (f64, f64) {
-        let last = wrenches.len().saturating_sub(1).max(1) as f64;
-        wrenches
-            .iter()
-            .enumerate()
-            .map(|(k, w)| (self.resistance(w), self.travel * k as f64 / last))
-            .max_by(|a, b| a.0.total_cmp(&b.0))
-            .unwrap_or_default()
+    /// The snap, or the largest resistance where there is none.
+    pub(super) fn peak(&self, wrenches: &[[f64; 6]]) -> Peak {
+        snap(wrenches.iter().map(|w| self.resistance(w)))
+    }
+
+    /// m, the handle's travel at a step of the path.
+    pub(super) fn travel_at(&self, step: usize, n_steps: usize) -> f64 {
+        self.travel * step as f64 / n_steps.saturating_sub(1).max(1) as f64
+    }
+
+    /// N, largest resistance.
+    pub(super) fn largest(&self, wrenches: &[[f64; 6]]) -> f64 {
+        let all = wrenches.iter().map(|w| self.resistance(w));
+        all.fold(0.0, f64::max)
     }
 }
 
@@ -107,8 +114,12 @@ pub(super) fn errors(
 ) -> Errors {
     let largest = |path: &[[f64; 6]]| path.iter().map(|w| scales.size(w)).fold(0.0, f64::max);
     let difference = differences(&measured.wrench, &reference.wrench);
-    let (peak, at) = scales.peak(&measured.wrench);
-    let (peak_ref, at_ref) = scales.peak(&reference.wrench);
+    let (peak, peak_ref) = (
+        scales.peak(&measured.wrench),
+        scales.peak(&reference.wrench),
+    );
+    let are_alike = peak.is_snap == peak_ref.is_snap;
+    let travel = |peak: Peak| scales.travel_at(peak.at, measured.wrench.len());
     let top = (0..reference.potential.len())
         .max_by(|a, b| reference.potential[*a].total_cmp(&reference.potential[*b]))
         .unwrap_or(0);
@@ -120,8 +131,8 @@ pub(super) fn errors(
         wrench_l2: distance(&measured.wrench, &reference.wrench, scales),
         solver_l2: distance(&measured.wrench, exact, scales),
         wrench_max: ratio(largest(&difference), largest(&reference.wrench)),
-        peak: ratio(peak - peak_ref, peak_ref),
-        peak_travel: at - at_ref,
+        peak: are_alike.then(|| ratio(peak.force - peak_ref.force, peak_ref.force)),
+        peak_travel: are_alike.then(|| travel(peak) - travel(peak_ref)),
         displacement: same_samples.then(|| {
             let squared = |pairs: &mut dyn Iterator<Item = f64>| pairs.map(|x| x * x).sum::<f64>();
             let (u, v) = (&measured.displacement, &reference.displacement);
@@ -174,9 +185,10 @@ mod tests {
             bytes: 1000.0,
             prepare_s: 0.5,
             n_timed: 100,
-            step: super::super::measure::Times::default(),
-            shape: super::super::measure::Times::default(),
-            stages: vec![],
+            step: None,
+            shape: None,
+            stages: vec![None; crate::engine::N_STAGES],
+            repeats: None,
             free_nodes: 0,
             contacts: 3,
             not_converged: 0,
@@ -207,15 +219,25 @@ mod tests {
         for error in [
             errors.wrench_l2,
             errors.wrench_max,
-            errors.peak,
+            errors.peak.unwrap(),
             errors.displacement.unwrap(),
         ] {
             assert!((error - 0.1).abs() < 1e-12, "{errors:?}");
         }
-        assert_eq!((errors.peak_travel, errors.solver_l2), (0.0, 0.0));
+        assert_eq!((errors.peak_travel, errors.solver_l2), (Some(0.0), 0.0));
         // Energy a tenth larger: the root of it.
         assert!((errors.energy - 0.1f64.sqrt()).abs() < 1e-12);
-        assert_eq!(SCALES.peak(&path(1.0)), (4.0, 0.005));
+        let peak = SCALES.peak(&path(1.0));
+        assert_eq!((peak.force, peak.is_snap), (4.0, true));
+        assert_eq!(SCALES.travel_at(peak.at, 5), 0.005);
+    }
+
+    #[test]
+    fn a_snap_is_not_compared_with_a_largest_force() {
+        let mut other = measured(1.0);
+        other.wrench[3..].fill([0.0, 5.0, 0.0, 0.0, 0.0, 0.0]);
+        let errors = errors(&other, &path(1.0), &reference(), &SCALES);
+        assert_eq!((errors.peak, errors.peak_travel), (None, None));
     }
 
     #[test]

@@ -11,6 +11,7 @@ use glam::DVec3;
 use glamx::DPose3;
 use serde::{Deserialize, Serialize};
 
+use super::busy::Repeats;
 use super::point::Setting;
 use crate::engine::{Engine, N_STAGES, Stage, StepReport};
 use crate::prepare::{PrepareOptions, PreparedPart, prepare};
@@ -30,6 +31,12 @@ const MOMENTS: usize = 30;
 /// Least time of timed steps with contact, s, and most rounds.
 const TIMED_S: f64 = 0.6;
 const MOST_ROUNDS: usize = 20;
+
+/// The same steps are timed this often whatever it takes, and this often unless that takes [`MOST_TIME`] of the time that
+/// is given.
+const FEWEST_ROUNDS: usize = 2;
+const REPEATED_ROUNDS: usize = 4;
+const MOST_TIME: f64 = 10.0;
 
 /// How the handle goes: from the start to the end of its travel, without the hand's own motion, so
 /// that all settings are asked the same question.
@@ -174,13 +181,59 @@ pub struct Times {
 }
 
 impl Times {
-    fn of_ns(ns: &[u64]) -> Self {
-        Percentiles::of_ns(ns.iter().copied()).map_or(Self::default(), |p| Self {
+    /// `None`: nothing was timed.
+    fn of_ns(ns: impl Iterator<Item = u64>) -> Option<Self> {
+        Percentiles::of_ns(ns).map(|p| Self {
             p50: p.p50,
             p99: p.p99,
             p999: p.p999,
             max: p.max,
         })
+    }
+}
+
+/// Times (ns) of the same steps in several rounds.
+#[derive(Debug)]
+struct Rounds {
+    /// By step.
+    of_step: Vec<Vec<u64>>,
+    spent_s: f64,
+    timed_s: f64,
+    n_rounds: usize,
+}
+
+impl Rounds {
+    fn new(n_steps: usize, timed_s: f64) -> Self {
+        Self {
+            of_step: vec![Vec::new(); n_steps],
+            spent_s: 0.0,
+            timed_s,
+            n_rounds: 0,
+        }
+    }
+
+    /// Whether another round is to be made. Each step is timed several times whatever the time that is given, so that no
+    /// setting stays without times and other work on the machine is seen.
+    fn begins_another(&mut self) -> bool {
+        let is_enough = match self.n_rounds {
+            n if n < FEWEST_ROUNDS => false,
+            n if n < REPEATED_ROUNDS => self.spent_s > MOST_TIME * self.timed_s,
+            n => n >= MOST_ROUNDS || self.spent_s > self.timed_s,
+        };
+        self.n_rounds += usize::from(!is_enough);
+        !is_enough
+    }
+
+    fn has_contact(&mut self, step: usize, ns: u64) {
+        self.of_step[step].push(ns);
+    }
+
+    fn all(&self) -> impl Iterator<Item = u64> {
+        self.of_step.iter().flatten().copied()
+    }
+
+    fn repeats(self) -> Option<Repeats> {
+        Repeats::of(self.of_step.into_iter())
     }
 }
 
@@ -199,12 +252,14 @@ pub struct Measured {
     pub prepare_s: f64,
     /// Steps with contact that were timed.
     pub n_timed: usize,
-    /// Whole step.
-    pub step: Times,
-    /// Drawn shape.
-    pub shape: Times,
-    /// By stage, in the order of [`Stage::ALL`].
-    pub stages: Vec<Times>,
+    /// Whole step; `None` if no step with contact was timed.
+    pub step: Option<Times>,
+    /// Drawn shape; `None` if it was not timed.
+    pub shape: Option<Times>,
+    /// By stage, in the order of [`Stage::ALL`]; `None` for those that were not timed.
+    pub stages: Vec<Option<Times>>,
+    /// How alike repeated steps were; `None` if none was repeated.
+    pub repeats: Option<Repeats>,
     /// Interface nodes that were free at most, where some are not.
     pub free_nodes: usize,
     /// Contacts at most.
@@ -234,9 +289,10 @@ impl Measured {
             bytes: prepared.bytes(),
             prepare_s: prepared.total_seconds(),
             n_timed: 0,
-            step: Times::default(),
-            shape: Times::default(),
-            stages: Vec::new(),
+            step: None,
+            shape: None,
+            stages: vec![None; N_STAGES],
+            repeats: None,
             free_nodes: 0,
             contacts: 0,
             not_converged: 0,
@@ -362,41 +418,40 @@ pub(super) fn measure(
         }
     }
 
-    let mut times = vec![Vec::new(); N_STAGES + 2];
-    let mut spent = 0.0;
-    for _ in 0..MOST_ROUNDS {
-        if spent > timed_s {
-            break;
-        }
+    let mut of_stage = vec![Vec::new(); N_STAGES];
+    let mut drawn = Vec::new();
+    let mut rounds = Rounds::new(course.targets.len(), timed_s);
+    while rounds.begins_another() {
         if interrupt::is_requested() {
             return Err(Error::Interrupted);
         }
         engine.reset();
-        for (target, wrench) in course.targets.iter().zip(&contact_wrench) {
+        for (k, (target, wrench)) in course.targets.iter().zip(&contact_wrench).enumerate() {
             let begun = Instant::now();
             let report = engine.step(target);
             let stepped = begun.elapsed();
             shape.update(engine)?;
             let all = begun.elapsed();
             debug_assert_eq!(report.contact_wrench_on_tool, *wrench, "rounds are alike");
-            spent += all.as_secs_f64();
+            rounds.spent_s += all.as_secs_f64();
             if report.contacts == 0 {
                 continue;
             }
             for (stage, ns) in report.stage_ns.iter().enumerate() {
-                times[stage].push(*ns);
+                of_stage[stage].push(*ns);
             }
-            times[N_STAGES].push(stepped.as_nanos() as u64);
-            times[N_STAGES + 1].push((all - stepped).as_nanos() as u64);
+            rounds.has_contact(k, stepped.as_nanos() as u64);
+            drawn.push((all - stepped).as_nanos() as u64);
         }
     }
-    found.n_timed = times[N_STAGES].len();
+    found.n_timed = drawn.len();
     found.stages = Stage::ALL
         .iter()
-        .map(|stage| Times::of_ns(&times[*stage as usize]))
+        .map(|stage| Times::of_ns(of_stage[*stage as usize].iter().copied()))
         .collect();
-    found.step = Times::of_ns(&times[N_STAGES]);
-    found.shape = Times::of_ns(&times[N_STAGES + 1]);
+    found.step = Times::of_ns(rounds.all());
+    found.shape = Times::of_ns(drawn.into_iter());
+    found.repeats = rounds.repeats();
     Ok(found)
 }
 
@@ -462,10 +517,28 @@ mod tests {
 
     #[test]
     fn times_are_those_of_their_rank() {
-        let times = Times::of_ns(&(1..=1000).map(|k| 1000 * k).collect::<Vec<_>>());
+        let times = Times::of_ns((1..=1000).map(|k| 1000 * k)).unwrap();
         assert!((times.p50 - 500.0).abs() <= 1.0, "{times:?}");
         assert!((times.p999 - 999.0).abs() <= 1.0, "{times:?}");
         assert_eq!(times.max, 1000.0);
-        assert_eq!(Times::of_ns(&[]), Times::default());
+        assert_eq!(Times::of_ns(std::iter::empty()), None);
+    }
+
+    /// A slow machine, or a slow setting: the first round alone is beyond the time that is given.
+    #[test]
+    fn steps_are_timed_and_repeated_however_slow_they_are() {
+        let mut rounds = Rounds::new(1, 0.1);
+        while rounds.begins_another() {
+            rounds.spent_s += 60.0;
+            rounds.has_contact(0, 60_000_000_000);
+        }
+        assert_eq!(rounds.n_rounds, FEWEST_ROUNDS);
+        assert_eq!(rounds.repeats().unwrap().rounds, FEWEST_ROUNDS);
+        let mut quick = Rounds::new(1, 0.1);
+        while quick.begins_another() {
+            quick.spent_s += 1e-3;
+        }
+        assert_eq!(quick.n_rounds, MOST_ROUNDS);
+        assert_eq!(quick.repeats(), None, "no step has contact");
     }
 }

@@ -27,15 +27,16 @@ pub fn write(study: &Study, out: &Path) -> Result<(), Error> {
         study,
         "time of a step (µs): hollow 50 %, filled 99.9 % are faster",
         true,
-        &|m| [m.step.p50, m.step.p999],
+        &step_times,
     )
     .map_err(plot_error)?;
     let solver = solver_plot(study).map_err(plot_error)?;
     let memory = plot(study, "memory that is read (MB)", false, &|m| {
-        [1e-6 * m.bytes; 2]
+        Some([1e-6 * m.bytes; 2])
     })
     .map_err(plot_error)?;
-    let prepare = plot(study, "preparing (s)", false, &|m| [m.prepare_s; 2]).map_err(plot_error)?;
+    let prepare =
+        plot(study, "preparing (s)", false, &|m| Some([m.prepare_s; 2])).map_err(plot_error)?;
     let curves = force_curves(&study.curves).map_err(plot_error)?;
     store::write(&out.join("accuracy.csv"), &csv(study))?;
     store::write(&out.join("accuracy.json"), &to_json(study))?;
@@ -53,7 +54,7 @@ fn plot(
     study: &Study,
     cost: &str,
     is_step: bool,
-    of: &dyn Fn(&Measured) -> [f64; 2],
+    of: &dyn Fn(&Measured) -> Option<[f64; 2]>,
 ) -> Result<String, Box<dyn std::error::Error>> {
     let scale = Scale {
         cost: cost.to_owned(),
@@ -74,15 +75,19 @@ fn solver_plot(study: &Study) -> Result<String, Box<dyn std::error::Error>> {
     };
     // Other orders and meshes are their own exact solutions.
     let of_solver = |axis: Axis| !matches!(axis, Axis::Order | Axis::Mesh | Axis::Quadrature);
-    let times = |m: &Measured| [m.step.p50, m.step.p999];
-    draw(study, &scale, &of_solver, &times, &|e| e.solver_l2)
+    draw(study, &scale, &of_solver, &step_times, &|e| e.solver_l2)
+}
+
+/// µs; none where no step was timed: such settings are no points of a plot over time.
+fn step_times(measured: &Measured) -> Option<[f64; 2]> {
+    measured.step.map(|times| [times.p50, times.p999])
 }
 
 fn draw(
     study: &Study,
     scale: &Scale,
     is_shown: &dyn Fn(Axis) -> bool,
-    cost_of: &dyn Fn(&Measured) -> [f64; 2],
+    cost_of: &dyn Fn(&Measured) -> Option<[f64; 2]>,
     error_of: &dyn Fn(&Errors) -> f64,
 ) -> Result<String, Box<dyn std::error::Error>> {
     let names: Vec<String> = Axis::ALL.iter().map(|a| a.name().to_owned()).collect();
@@ -92,7 +97,7 @@ fn draw(
         .filter(|row| is_shown(row.axis))
         .filter_map(|row| {
             let (measured, errors) = row.outcome.as_ref().ok()?;
-            let cost = cost_of(measured).map(|c| c.max(1e-6));
+            let cost = cost_of(measured)?.map(|c| c.max(1e-6));
             // The reference itself has no error to show.
             if scale.bar.is_some() && error_of(errors) == 0.0 {
                 return None;
@@ -122,6 +127,16 @@ fn draw(
     error_over_cost(&names, &points, scale)
 }
 
+/// Whether a folder holds the JSON of a finished study; other programs may write a file of this name too.
+pub(super) fn is_written_in(out: &Path) -> bool {
+    let text = std::fs::read(out.join("accuracy.json")).unwrap_or_default();
+    serde_json::from_slice::<serde_json::Value>(&text).is_ok_and(|value| {
+        ["sentence", "reference", "rows"]
+            .iter()
+            .all(|key| value.get(key).is_some())
+    })
+}
+
 fn to_json(study: &Study) -> String {
     let rows: Vec<_> = study
         .rows
@@ -140,6 +155,7 @@ fn to_json(study: &Study) -> String {
                     value["prepare_s"] = json!(m.prepare_s);
                     value["bytes"] = json!(m.bytes);
                     value["errors"] = json!(e);
+                    value["repeats"] = json!(m.repeats);
                     value["penetration_m"] = json!(m.penetration);
                     value["certificate"] = json!(m.certificate);
                 }
@@ -152,6 +168,8 @@ fn to_json(study: &Study) -> String {
         "title": study.title,
         "sentence": study.sentence(),
         "machine": study.machine,
+        "load": study.load,
+        "busy": study.busy(),
         "gpu": study.adapter,
         "reference": {
             "made": study.reference.made,
@@ -159,6 +177,7 @@ fn to_json(study: &Study) -> String {
             "bar_made": study.reference.bar_made,
             "peak_force_N": study.peak.0,
             "travel_at_peak_m": study.peak.1,
+            "snaps": study.is_snap,
         },
         "rows": rows,
     }))
@@ -174,11 +193,14 @@ const HEAD: &str = "<tr><th>setting</th><th>step, 50 % (µs)</th><th>step, 99.9 
 const HOW_TO_READ: &str = "<ul>\
 <li><b>wrench</b>: distance of force and torque from the reference along the whole path, root of the \
 mean square, as a share of the reference's. <b>solver</b>: the same against the exact solution on the \
-same mesh. <b>peak</b>: of the largest force, with its sign. \
+same mesh. <b>peak</b>: of the force at which it snaps (the first peak that the force falls from, not what \
+it meets at the end), with its sign; of the largest force where nothing snaps; a dash where only one of setting and \
+reference snaps. \
 <b>shape</b>: of the drawn displacement where the part can touch; a dash where the mesh has other \
 nodes. <b>energy</b>: in the energy norm at the reference's highest energy. <b>depth</b>: how deep \
 a node, or a point on an edge between nodes, is inside the tool at most.</li>\
 <li>Errors below the reference's own are no differences.</li>\
+<li><b>not timed</b>: no step with contact was timed, so nothing is said of its time.</li>\
 <li>Only steps with contact are counted, the whole step without the drawn shape, which a session \
 makes 60 times a second. No slow step is left out.</li>\
 <li>The orange band is the front: settings that no other beats in both time and error.</li></ul>";
@@ -203,15 +225,23 @@ fn page(study: &Study, plots: [&String; 4], curves: &str) -> String {
     );
     let _ = writeln!(
         page,
-        "<p>Reference: {}; its peak is {} N at {} mm of the handle's travel. Its own error is {}: {}. The \
-         scene's own settings: {}.</p>",
+        "<p>Reference: {}; {} (travel of the handle). Its own error is {}: {}. The scene's own settings: \
+         {}.</p>",
         escaped(&study.reference.made),
-        short(study.peak.0),
-        short(1e3 * study.peak.1),
+        study.peak_words(),
         study.reference.bar.map_or("unknown".to_owned(), percent),
         escaped(&study.reference.bar_made),
         escaped(&study.own),
     );
+    if let Some(busy) = study.busy() {
+        let _ = writeln!(page, "<p class=\"warning\">{}</p>", escaped(&busy));
+    }
+    let untimed: Vec<String> = study
+        .distinct()
+        .iter()
+        .filter(|(_, m, _)| m.step.is_none())
+        .map(|(row, ..)| name(row))
+        .collect();
     let figure = |page: &mut String, svg: &str, caption: &str| {
         let _ = writeln!(
             page,
@@ -223,7 +253,14 @@ fn page(study: &Study, plots: [&String; 4], curves: &str) -> String {
     figure(
         &mut page,
         plots[0],
-        "One line for each choice; each point is the scene's own setting with that one changed.",
+        &format!(
+            "One line for each choice; each point is the scene's own setting with that one changed.{}",
+            if untimed.is_empty() {
+                String::new()
+            } else {
+                format!(" Not timed, so not shown: {}.", untimed.join(", "))
+            }
+        ),
     );
     let _ = writeln!(page, "<h2>What the solver adds</h2>");
     figure(
@@ -252,7 +289,11 @@ fn page(study: &Study, plots: [&String; 4], curves: &str) -> String {
         if rows.is_empty() {
             continue;
         }
-        let _ = writeln!(page, "<h3>{}</h3><table>{HEAD}", escaped(axis.title()));
+        let _ = writeln!(
+            page,
+            "<h3>{}</h3><div class=\"scroll\"><table>{HEAD}",
+            escaped(axis.title())
+        );
         for row in rows {
             let label = if row.is_own {
                 format!("<b>{}</b> (own)", escaped(&row.label))
@@ -273,7 +314,7 @@ fn page(study: &Study, plots: [&String; 4], curves: &str) -> String {
                 }
             }
         }
-        page.push_str("</table>\n");
+        page.push_str("</table></div>\n");
     }
     let _ = writeln!(page, "<ul>");
     for (what, why) in &study.not_there {
@@ -283,10 +324,13 @@ fn page(study: &Study, plots: [&String; 4], curves: &str) -> String {
         let _ = writeln!(page, "<li>The GPU: {}.</li>", escaped(adapter));
     }
     let stages = study.distinct();
-    if let Some((row, measured, _)) = stages.iter().find(|(row, ..)| row.is_own) {
+    let is_own =
+        |(row, measured, _): &&(&Row, &Measured, &Errors)| row.is_own && measured.step.is_some();
+    if let Some((row, measured, _)) = stages.iter().find(is_own) {
         let list: Vec<String> = crate::engine::Stage::ALL
             .iter()
             .zip(&measured.stages)
+            .filter_map(|(stage, times)| Some((stage, (*times)?)))
             .map(|(stage, t)| format!("{} {} and {}", stage.name(), short(t.p50), short(t.p999)))
             .collect();
         let _ = writeln!(
@@ -312,7 +356,7 @@ fn curves_caption(study: &Study) -> String {
     for (label, peak) in &study.off_scale {
         let _ = write!(
             caption,
-            " Not shown: {label}, which peaks at {} N.",
+            " Not shown: {label}, which reaches {} N.",
             short(*peak)
         );
     }

@@ -1,5 +1,6 @@
 //! `accuracy = { budget_us = ... }`: the most accurate settings whose steps keep a budget here.
 
+use super::busy::Repeats;
 use super::compare::{Scales, distance};
 use super::measure::{Course, Samples, measure, ready};
 use super::point::{Setting, base, set_accuracy};
@@ -21,8 +22,12 @@ const TIMED_S: f64 = 0.3;
 pub(super) struct Rung {
     /// In words.
     pub name: String,
-    /// 99.9 % of the steps are faster, µs.
-    pub p999_us: f64,
+    /// Half and 99.9 % of the steps are faster, µs; `None` if the path has no contact.
+    pub times_us: Option<(f64, f64)>,
+    /// Order of the elements.
+    pub order: u8,
+    /// How alike repeated steps were.
+    pub repeats: Option<Repeats>,
     /// Error of the wrench against the top rung.
     pub error: f64,
 }
@@ -68,7 +73,9 @@ pub fn resolved(
         let found = measure(&mut ready, &setting.scene, &course, samples, Some(TIMED_S))?;
         rungs.push(Rung {
             name,
-            p999_us: found.step.p999,
+            times_us: found.step.map(|t| (t.p50, t.p999)),
+            order: found.order,
+            repeats: found.repeats,
             error: 0.0,
         });
         paths.push(found.wrench);
@@ -123,9 +130,28 @@ fn ladder(scene: &Scene) -> Vec<(String, Setting)> {
     rungs
 }
 
+impl Rung {
+    /// µs; a path without contact keeps any budget.
+    fn p999_us(&self) -> f64 {
+        self.times_us.map_or(0.0, |times| times.1)
+    }
+
+    /// What its steps take.
+    fn words(&self) -> String {
+        match self.times_us {
+            Some((p50, p999)) => format!(
+                "99.9 % of whose steps take less than {} us here and half less than {} us",
+                short(p999),
+                short(p50)
+            ),
+            None => "of whose steps none was timed, because the path has no contact".to_owned(),
+        }
+    }
+}
+
 /// The rung with the least error that keeps the budget.
 fn pick(rungs: &[Rung], budget_us: f64) -> Result<Picked, String> {
-    let keeps = |rung: &Rung| rung.p999_us <= budget_us;
+    let keeps = |rung: &Rung| rung.p999_us() <= budget_us;
     let by_error = |a: &&usize, b: &&usize| rungs[**a].error.total_cmp(&rungs[**b].error);
     let all: Vec<usize> = (0..rungs.len()).collect();
     let least = all
@@ -136,14 +162,16 @@ fn pick(rungs: &[Rung], budget_us: f64) -> Result<Picked, String> {
     // Of those that are as good but for chance, the highest.
     let as_good = |k: &&usize| keeps(&rungs[**k]) && rungs[**k].error <= AS_GOOD * least;
     let Some(&best) = all.iter().find(as_good) else {
-        let nearest = rungs.iter().min_by(|a, b| a.p999_us.total_cmp(&b.p999_us));
+        let nearest = rungs
+            .iter()
+            .min_by(|a, b| a.p999_us().total_cmp(&b.p999_us()));
         return Err(match nearest {
             Some(rung) => format!(
-                "no setting keeps accuracy.budget_us = {budget_us}: the nearest is {}, 99.9 % of whose \
-                 steps take less than {} us here; allow {} or more",
+                "no setting keeps accuracy.budget_us = {budget_us}: the nearest is {}, {}; allow {} or more{}",
                 rung.name,
-                short(rung.p999_us),
-                (1.2 * rung.p999_us).ceil()
+                rung.words(),
+                (1.2 * rung.p999_us()).ceil(),
+                busy(rungs),
             ),
             None => "no setting could be measured".to_owned(),
         });
@@ -154,7 +182,7 @@ fn pick(rungs: &[Rung], budget_us: f64) -> Result<Picked, String> {
         .filter(|k| !keeps(&rungs[**k]) && rungs[**k].error < rung.error)
         .max_by(by_error);
     let next = better.map_or(String::new(), |k| {
-        let (name, p999) = (&rungs[*k].name, short(rungs[*k].p999_us));
+        let (name, p999) = (&rungs[*k].name, short(rungs[*k].p999_us()));
         format!("; {name}, the next more accurate, needs {p999} us")
     });
     let apart = match best {
@@ -164,12 +192,51 @@ fn pick(rungs: &[Rung], budget_us: f64) -> Result<Picked, String> {
     Ok(Picked {
         rung: best,
         why: format!(
-            "accuracy.budget_us = {budget_us}: picked {}, 99.9 % of whose steps take less than {} us here, \
-             {apart}{next}",
+            "accuracy.budget_us = {budget_us}: picked {}, {}, {apart}{next}{}{}",
             rung.name,
-            short(rung.p999_us),
+            rung.words(),
+            linear(rung, rungs),
+            busy(rungs),
         ),
     })
+}
+
+/// A warning of linear elements, with what those of the next order need.
+fn linear(rung: &Rung, rungs: &[Rung]) -> String {
+    let higher = rungs
+        .iter()
+        .filter(|other| other.order > 1)
+        .min_by(|a, b| a.p999_us().total_cmp(&b.p999_us()));
+    match higher {
+        Some(other) if rung.order == 1 => format!(
+            "; warning: linear elements are far too stiff in bending, so forces are wrong by a factor, not by some per \
+             cent: do not rely on them; budget_us = {} allows {}",
+            (1.2 * other.p999_us()).ceil(),
+            other.name
+        ),
+        _ if rung.order == 1 => {
+            "; warning: linear elements are far too stiff in bending, so forces are wrong by a \
+                                 factor; this mesh cannot be raised to order 2"
+                .to_owned()
+        }
+        _ => String::new(),
+    }
+}
+
+/// A warning if other work disturbed the measurement.
+fn busy(rungs: &[Rung]) -> String {
+    let busy: Vec<&Repeats> = rungs
+        .iter()
+        .filter_map(|rung| rung.repeats.as_ref())
+        .filter(|repeats| repeats.is_busy())
+        .collect();
+    match busy.first() {
+        Some(repeats) if 2 * busy.len() > rungs.len() => format!(
+            "; the machine was busy meanwhile ({}): measure again while nothing else runs",
+            repeats.words()
+        ),
+        _ => String::new(),
+    }
 }
 
 #[cfg(test)]
@@ -185,7 +252,9 @@ mod tests {
         ]
         .map(|(name, p999_us, error)| Rung {
             name: name.to_owned(),
-            p999_us,
+            times_us: Some((0.5 * p999_us, p999_us)),
+            order: name.as_bytes()[6] - b'0',
+            repeats: None,
             error,
         })
         .to_vec()
@@ -197,11 +266,14 @@ mod tests {
         assert_eq!(picked.rung, 1);
         assert_eq!(
             picked.why,
-            "accuracy.budget_us = 200: picked order 2, 99.9 % of whose steps take less than 120 us \
-             here, 5 % from order 3; order 3, the next more accurate, needs 300 us"
+            "accuracy.budget_us = 200: picked order 2, 99.9 % of whose steps take less than 120 us here and half \
+             less than 60 us, 5 % from order 3; order 3, the next more accurate, needs 300 us"
         );
         assert_eq!(pick(&rungs(), 1000.0).unwrap().rung, 0);
-        assert_eq!(pick(&rungs(), 35.0).unwrap().rung, 3);
+        let linear = pick(&rungs(), 35.0).unwrap();
+        assert_eq!(linear.rung, 3);
+        let warning = "wrong by a factor, not by some per cent: do not rely on them; budget_us = 48 allows order 2, 1 pass";
+        assert!(linear.why.contains(warning), "{}", linear.why);
         // A lower rung that is better by chance only is not picked.
         let mut close = rungs();
         close[2].error = 0.0499;
@@ -212,8 +284,41 @@ mod tests {
     fn a_budget_that_nothing_keeps_names_the_nearest() {
         assert_eq!(
             pick(&rungs(), 10.0).unwrap_err(),
-            "no setting keeps accuracy.budget_us = 10: the nearest is order 1, 99.9 % of whose steps take \
-             less than 30 us here; allow 36 or more"
+            "no setting keeps accuracy.budget_us = 10: the nearest is order 1, 99.9 % of whose steps take less than \
+             30 us here and half less than 15 us; allow 36 or more"
+        );
+    }
+
+    #[test]
+    fn a_path_without_contact_keeps_any_budget_and_no_time_is_told() {
+        let mut untouched = rungs();
+        for rung in &mut untouched {
+            (rung.times_us, rung.error) = (None, 0.0);
+        }
+        let picked = pick(&untouched, 1.0).unwrap();
+        assert_eq!(picked.rung, 0);
+        assert!(
+            picked.why.contains("the path has no contact"),
+            "{}",
+            picked.why
+        );
+        assert!(!picked.why.contains("0 us"), "{}", picked.why);
+    }
+
+    #[test]
+    fn a_busy_machine_is_told() {
+        let mut busy = rungs();
+        for rung in &mut busy {
+            rung.repeats = Some(Repeats {
+                rounds: 4,
+                typical: 1.8,
+                disturbed: 0.04,
+            });
+        }
+        let why = pick(&busy, 200.0).unwrap().why;
+        assert!(
+            why.contains("busy meanwhile (the same step, repeated, took 1.8 times"),
+            "{why}"
         );
     }
 }

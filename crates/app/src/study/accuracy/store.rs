@@ -12,10 +12,14 @@ use super::point::Setting;
 use crate::Error;
 use crate::prepare::load;
 use crate::scene::Scene;
-use crate::setup;
+use crate::{leftovers, setup};
 
-/// Changes when what is stored means something else.
-const FORMAT: u32 = 1;
+/// Changes when what is stored of a setting means something else. Since 2, what was not timed has no times; before, it
+/// had 0 µs.
+const FORMAT: u32 = 2;
+
+/// The same of a reference in a file.
+const REFERENCE_FORMAT: u32 = 1;
 
 /// What a scene is, whatever its settings of accuracy: a hash of mesh, material, supports, contact,
 /// tool, path and coupling.
@@ -78,6 +82,7 @@ struct Stored {
 impl Store {
     pub(super) fn new(folder: &Path, scene: &str) -> Result<Self, Error> {
         fs::create_dir_all(folder).map_err(Error::io(folder, "create the folder of points"))?;
+        leftovers::sweep_files(folder, |_, stem| is_hash(stem));
         Ok(Self {
             folder: folder.to_owned(),
             scene: scene.to_owned(),
@@ -96,7 +101,7 @@ impl Store {
     }
 
     fn file(&self, key: &str) -> PathBuf {
-        let name = &blake3::hash(key.as_bytes()).to_hex()[..24];
+        let name = &blake3::hash(key.as_bytes()).to_hex()[..HASH_DIGITS];
         self.folder.join(format!("{name}.json"))
     }
 
@@ -128,11 +133,36 @@ impl Store {
 
 /// Writes beside and renames.
 pub(super) fn write(file: &Path, text: &str) -> Result<(), Error> {
-    let beside = file.with_extension("partial");
-    fs::write(&beside, text)
-        .map_err(Error::io(&beside, "write (name another folder with --out)"))?;
-    fs::rename(&beside, file).map_err(Error::io(file, "put in its place"))
+    leftovers::write_beside(file, text.as_bytes())
+        .map_err(Error::io(file, "write (name another folder with --out)"))
 }
+
+/// Forgets what was finished; other files in the folder stay.
+pub(super) fn forget(folder: &Path) {
+    for path in points_in(folder) {
+        let _ = fs::remove_file(path);
+    }
+}
+
+/// Files of finished settings in a folder, by their names.
+pub(super) fn points_in(folder: &Path) -> Vec<PathBuf> {
+    let listed = fs::read_dir(folder).into_iter().flatten().flatten();
+    listed
+        .map(|entry| entry.path())
+        .filter(|path| {
+            let name = path.file_name().and_then(|name| name.to_str());
+            name.and_then(|name| name.strip_suffix(".json"))
+                .is_some_and(is_hash)
+        })
+        .collect()
+}
+
+fn is_hash(name: &str) -> bool {
+    name.len() == HASH_DIGITS && name.bytes().all(|b| b.is_ascii_hexdigit())
+}
+
+/// Of a setting's key, in the name of its file.
+const HASH_DIGITS: usize = 24;
 
 /// A reference as a file.
 #[derive(Serialize, Deserialize)]
@@ -151,7 +181,7 @@ pub(super) fn save_reference(
     reference: &Reference,
 ) -> Result<(), Error> {
     let content = ReferenceFile {
-        format: FORMAT,
+        format: REFERENCE_FORMAT,
         scene: identity.to_owned(),
         title: scene.title.clone(),
         reference: reference.clone(),
@@ -176,9 +206,9 @@ pub(super) fn read_reference(
             "is no reference of `snapin accuracy` ({e}); write one with --save-reference"
         ))
     })?;
-    if content.format != FORMAT {
+    if content.format != REFERENCE_FORMAT {
         return Err(refuse(format!(
-            "has format {}, this version reads {FORMAT}; write it anew with --save-reference",
+            "has format {}, this version reads {REFERENCE_FORMAT}; write it anew with --save-reference",
             content.format
         )));
     }

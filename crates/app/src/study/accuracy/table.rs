@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::compare::pareto_front;
-use super::{Axis, Errors, Measured, Row, Study};
+use super::{Axis, Errors, Measured, Row, Study, Times};
 use crate::engine::Stage;
 use crate::prepare::budget::{bytes, duration};
 use crate::report::plot::short;
@@ -30,24 +30,30 @@ impl Study {
         let mut all = self.distinct();
         // What is drawn is no part of a step: differences between its settings are those of the clock.
         all.retain(|(row, ..)| row.is_own || row.axis != Axis::Scalar);
-        let fits = |m: &Measured| m.step.p999 < PERIOD_US;
+        // What was not timed can be said nothing of.
+        all.retain(|(_, m, _)| m.step.is_some());
+        if all.is_empty() {
+            return self.nothing_timed();
+        }
+        let fits = |m: &Measured| p999(m) < PERIOD_US;
         let by_error = |a: &&(&Row, &Measured, &Errors), b: &&(&Row, &Measured, &Errors)| {
             // Equal errors: the faster one.
             let same = (a.2.wrench_l2 - b.2.wrench_l2).abs() <= 1e-6;
             let by_error = a.2.wrench_l2.total_cmp(&b.2.wrench_l2);
-            let by_time = a.1.step.p50.total_cmp(&b.1.step.p50);
+            let p50 = |m: &Measured| m.step.map_or(f64::INFINITY, |t| t.p50);
+            let by_time = p50(a.1).total_cmp(&p50(b.1));
             if same { by_time } else { by_error }
         };
         let best = all.iter().filter(|(_, m, _)| fits(m)).min_by(by_error);
         let Some((row, measured, errors)) = best else {
-            let fastest = all
-                .iter()
-                .min_by(|a, b| a.1.step.p999.total_cmp(&b.1.step.p999));
+            let fastest = all.iter().min_by(|a, b| p999(a.1).total_cmp(&p999(b.1)));
             return fastest.map_or("No setting could be run.".to_owned(), |(row, m, _)| {
                 format!(
-                    "No setting keeps 99.9 % of its steps under 1 ms here; {} comes nearest with {} µs.",
+                    "No setting keeps 99.9 % of its steps under 1 ms here; {} comes nearest with {} µs, half of its \
+                     steps take less than {} µs.",
                     name(row),
-                    short(m.step.p999)
+                    short(p999(m)),
+                    short(m.step.map_or(0.0, |t| t.p50))
                 )
             });
         };
@@ -59,15 +65,21 @@ impl Study {
             Some((other, m, e)) if e.wrench_l2 == 0.0 => format!(
                 "; {}, the reference itself, needs {} µs",
                 name(other),
-                short(m.step.p999)
+                short(p999(m))
             ),
             Some((other, m, e)) => format!(
                 "; {} would be within {} but needs {} µs",
                 name(other),
                 percent(e.wrench_l2),
-                short(m.step.p999)
+                short(p999(m))
             ),
             None => "; nothing that was measured is more accurate".to_owned(),
+        };
+        let at_peak = match errors.peak {
+            Some(peak) if self.is_snap => format!(", {} at the snap", percent(peak.abs())),
+            Some(peak) => format!(", {} of the largest force", percent(peak.abs())),
+            None if self.is_snap => ", and does not snap where the reference does".to_owned(),
+            None => ", and snaps where the reference does not".to_owned(),
         };
         let bar = match self.reference.bar {
             Some(bar) if errors.wrench_l2 == 0.0 => format!(
@@ -83,13 +95,45 @@ impl Study {
         };
         format!(
             "Under 1 ms the best setting here is {}: 99.9 % of its steps take less than {} µs, and it gives \
-             up {} of the force along the path against the reference{bar}, {} at the peak{gives_up}.",
+             up {} of the force along the path against the reference{bar}{at_peak}{gives_up}.",
             name(row),
-            short(measured.step.p999),
+            short(p999(measured)),
             percent(errors.wrench_l2),
-            percent(errors.peak.abs()),
         )
     }
+
+    /// Why there are no times.
+    fn nothing_timed(&self) -> String {
+        match self.distinct().first() {
+            None => "No setting could be run.".to_owned(),
+            Some(_) => "No setting was timed, because no step of the path has contact: let the tool reach the part."
+                .to_owned(),
+        }
+    }
+
+    /// What the peak of the tables is.
+    pub(super) fn peak_words(&self) -> String {
+        let (force, travel) = (short(self.peak.0), short(1e3 * self.peak.1));
+        if self.is_snap {
+            format!("it snaps at {force} N and {travel} mm")
+        } else if self.peak.0 <= 0.0 {
+            "nothing resists on this path".to_owned()
+        } else {
+            format!("it does not snap on this path; its largest force is {force} N at {travel} mm")
+        }
+    }
+}
+
+/// µs; infinite if no step was timed.
+pub(super) fn p999(measured: &Measured) -> f64 {
+    measured.step.map_or(f64::INFINITY, |times| times.p999)
+}
+
+/// In a cell of a time that is not there.
+const NOT_TIMED: &str = "not timed";
+
+fn time(times: Option<Times>, of: impl Fn(Times) -> f64) -> String {
+    times.map_or(NOT_TIMED.to_owned(), |times| short(of(times)))
 }
 
 /// A setting in words.
@@ -119,15 +163,17 @@ const COLUMNS: [&str; 12] = [
 /// Cells of a line: times, costs, errors.
 pub(super) fn cells(measured: &Measured, errors: &Errors) -> [String; 12] {
     [
-        short(measured.step.p50),
-        short(measured.step.p999),
-        short(measured.shape.p50),
+        time(measured.step, |t| t.p50),
+        time(measured.step, |t| t.p999),
+        time(measured.shape, |t| t.p50),
         duration(measured.prepare_s),
         bytes(measured.bytes),
         percent(errors.wrench_l2),
         percent(errors.solver_l2),
-        percent(errors.peak),
-        short(1e3 * errors.peak_travel),
+        errors.peak.map_or("-".to_owned(), percent),
+        errors
+            .peak_travel
+            .map_or("-".to_owned(), |shift| short(1e3 * shift)),
         errors.displacement.map_or("-".to_owned(), percent),
         percent(errors.energy),
         match 1e6 * measured.penetration {
@@ -148,12 +194,11 @@ pub fn text(study: &Study) -> String {
         study.reference.bar.map_or("-".to_owned(), percent),
         study.reference.bar_made
     );
-    let _ = writeln!(
-        out,
-        "its peak: {} N at {} mm\n",
-        short(study.peak.0),
-        short(1e3 * study.peak.1)
-    );
+    let _ = writeln!(out, "its peak: {}", study.peak_words());
+    if let Some(busy) = study.busy() {
+        let _ = writeln!(out, "warning: {busy}");
+    }
+    out.push('\n');
     let _ = write!(out, "{:<34}", "");
     for column in COLUMNS {
         let _ = write!(out, "{column:>11}");
@@ -202,14 +247,13 @@ pub(super) fn csv(study: &Study) -> String {
     }
     out.push_str(
         ",prepare_s,bytes,wrench_l2_rel,solver_l2_rel,wrench_max_rel,peak_rel,peak_travel_m,displacement_rel,\
-         energy_rel,penetration_m,certificate,switch_change_N,steps_not_converged,front\n",
+         energy_rel,penetration_m,certificate,switch_change_N,steps_not_converged,front,repeat_over_shortest,disturbed_share\n",
     );
     let all = study.distinct();
-    let costs: Vec<(f64, f64)> = all
-        .iter()
-        .map(|(_, m, e)| (m.step.p999, e.wrench_l2))
-        .collect();
-    let front: Vec<&Row> = pareto_front(&costs).into_iter().map(|k| all[k].0).collect();
+    let costs: Vec<(f64, f64)> = all.iter().map(|(_, m, e)| (p999(m), e.wrench_l2)).collect();
+    let is_timed = |k: &usize| all[*k].1.step.is_some();
+    let front = pareto_front(&costs).into_iter().filter(is_timed);
+    let front: Vec<&Row> = front.map(|k| all[k].0).collect();
     for row in &study.rows {
         let _ = write!(
             out,
@@ -225,41 +269,39 @@ pub(super) fn csv(study: &Study) -> String {
             Ok((m, e)) => {
                 let _ = write!(
                     out,
-                    ",ok,{},{},{},{},{},{},{},{},{},{},{},{}",
-                    m.nodes,
-                    m.elements,
-                    m.order,
-                    m.free_nodes,
-                    m.contacts,
-                    m.n_timed,
-                    m.step.p50,
-                    m.step.p99,
-                    m.step.p999,
-                    m.step.max,
-                    m.shape.p50,
-                    m.shape.p999
+                    ",ok,{},{},{},{},{},{}",
+                    m.nodes, m.elements, m.order, m.free_nodes, m.contacts, m.n_timed,
                 );
-                for stage in &m.stages {
-                    let _ = write!(out, ",{},{}", stage.p50, stage.p999);
-                }
                 let optional = |x: Option<f64>| x.map_or(String::new(), |x| x.to_string());
+                let mut times = |times: Option<Times>, of: &[fn(Times) -> f64]| {
+                    for of in of {
+                        let _ = write!(out, ",{}", optional(times.map(of)));
+                    }
+                };
+                times(m.step, &[|t| t.p50, |t| t.p99, |t| t.p999, |t| t.max]);
+                times(m.shape, &[|t| t.p50, |t| t.p999]);
+                for stage in &m.stages {
+                    times(*stage, &[|t| t.p50, |t| t.p999]);
+                }
                 let is_front = front.iter().any(|r| std::ptr::eq(*r, row));
                 let _ = writeln!(
                     out,
-                    ",{},{},{},{},{},{},{},{},{},{},{},{},{},{is_front}",
+                    ",{},{},{},{},{},{},{},{},{},{},{},{},{},{is_front},{},{}",
                     m.prepare_s,
                     m.bytes,
                     e.wrench_l2,
                     e.solver_l2,
                     e.wrench_max,
-                    e.peak,
-                    e.peak_travel,
+                    optional(e.peak),
+                    optional(e.peak_travel),
                     optional(e.displacement),
                     e.energy,
                     m.penetration,
                     m.certificate,
                     m.switch_change,
-                    m.not_converged
+                    m.not_converged,
+                    optional(m.repeats.map(|r| r.typical)),
+                    optional(m.repeats.map(|r| r.disturbed)),
                 );
             }
         }

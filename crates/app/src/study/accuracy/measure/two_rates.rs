@@ -5,9 +5,9 @@ use std::time::Instant;
 use device::Wrench;
 use glamx::DPose3;
 
-use super::{Course, MOST_ROUNDS, Measured, Ready, Times, contact_edges, displaced};
+use super::{Course, Measured, Ready, Rounds, Times, contact_edges, displaced};
 use super::{energy_of_coupling, penetration};
-use crate::engine::{N_STAGES, Stage, StepReport};
+use crate::engine::{Stage, StepReport};
 use crate::scene::Scene;
 use crate::session::fast::FastSettings;
 use crate::session::part_extent;
@@ -37,12 +37,11 @@ pub(super) fn measure(
     let edges = contact_edges(prepared);
     let moments = course.moments();
     let mut found = Measured::nothing_yet(prepared, course.targets.len());
-    let (mut ticks, mut drawn) = (Vec::new(), Vec::new());
-    let mut spent = 0.0;
-    for round in 0..MOST_ROUNDS {
-        if round > 0 && spent > timed_s {
-            break;
-        }
+    let mut drawn = Vec::new();
+    let mut rounds = Rounds::new(course.targets.len(), timed_s);
+    // The first round is for what is computed; it also warms up, and takes nothing from the time of the others.
+    let mut is_timed = false;
+    while !is_timed || rounds.begins_another() {
         if interrupt::is_requested() {
             return Err(Error::Interrupted);
         }
@@ -52,16 +51,16 @@ pub(super) fn measure(
             let begun = Instant::now();
             let answer = stepped.tick(k as u64, target, |report| on_handle(report, target));
             let tick = begun.elapsed();
-            spent += tick.as_secs_f64();
             if stepped.work(engine, k as u64, target).is_some() {
                 let begun = Instant::now();
                 shape.update(engine)?;
                 drawn.push(begun.elapsed().as_nanos() as u64);
             }
-            if round > 0 && answer.report.contacts > 0 {
-                ticks.push(tick.as_nanos() as u64);
-            }
-            if round > 0 {
+            if is_timed {
+                rounds.spent_s += tick.as_secs_f64();
+                if answer.report.contacts > 0 {
+                    rounds.has_contact(k, tick.as_nanos() as u64);
+                }
                 continue;
             }
             let report = &answer.report;
@@ -84,11 +83,12 @@ pub(super) fn measure(
                 found.penetration = found.penetration.max(deepest);
             }
         }
+        is_timed = true;
     }
-    found.n_timed = ticks.len();
-    found.step = Times::of_ns(&ticks);
-    found.shape = Times::of_ns(&drawn);
-    found.stages = vec![Times::default(); N_STAGES];
+    found.n_timed = rounds.all().count();
+    found.step = Times::of_ns(rounds.all());
+    found.shape = Times::of_ns(drawn.into_iter());
+    found.repeats = rounds.repeats();
     // A tick has no stages of its own.
     found.stages[Stage::Lcp as usize] = found.step;
     Ok(found)

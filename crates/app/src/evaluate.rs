@@ -7,6 +7,7 @@ mod words;
 use glam::DVec3;
 
 use crate::Error;
+use crate::between::BetweenNodes;
 use crate::choice::Why;
 use crate::effects::{Observed, Verdict, judge};
 use crate::engine::{Engine, Stage};
@@ -48,6 +49,7 @@ impl Story<'_> {
         } = self;
         let solver = FieldSolver::new(prepared, progress)?;
         let moments = Moments::of(recording);
+        let mut between = BetweenNodes::new(prepared, self.engine);
         let mut extremes = fem::stress::Extremes::default();
         let mut look = |u: &[f64]| {
             let here = solver.extremes(u);
@@ -59,7 +61,10 @@ impl Story<'_> {
             if crate::interrupt::is_requested() {
                 return Err(Error::Interrupted);
             }
-            look(&solver.displacement(recording, &recording.records[index]));
+            let record = &recording.records[index];
+            let u = solver.displacement(recording, record);
+            look(&u);
+            between.look(&u, &record.report.tool_pose);
         }
         let tool_extent = 0.4 * part_extent(&prepared.loaded.mesh);
         let mut frames = Vec::new();
@@ -90,6 +95,8 @@ impl Story<'_> {
             .filter(|v| choice(scene, v.name) == EffectChoice::Auto || v.missing)
             .collect();
         let mut warnings = self.remarks.clone();
+        let way = recording.records.iter().map(|r| r.travel);
+        warnings.extend(between.warning(way.fold(0.0, f64::max)));
         warnings.extend(self.shape.choice().warning());
         warnings.extend(self.shape.given_up().map(str::to_owned));
         warnings.extend(verdicts.iter().filter(|v| v.missing).map(|v| {

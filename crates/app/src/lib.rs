@@ -7,6 +7,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+pub mod between;
 pub mod choice;
 pub mod cli;
 pub mod crash;

@@ -67,6 +67,14 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// Length unit of the file: its name, and m.
+    pub fn length_unit(&self) -> (&'static str, f64) {
+        match self.units {
+            Units::Si => ("m", 1.0),
+            Units::MmNMpa => ("mm", 1e-3),
+        }
+    }
+
     /// Reads and checks a scene file. Paths in it are relative to its folder.
     ///
     /// # Errors
@@ -195,6 +203,19 @@ pub struct Tool {
     pub shape: ToolShape,
     /// Where the tool starts: its frame in the part's.
     pub pose_part_tool: DPose3,
+    /// Whether it may start in the part.
+    pub start: Start,
+}
+
+/// How the tool stands to the part before the first step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Start {
+    /// clear of the part or in touch with it; a tool inside the part is refused with the depth.
+    #[default]
+    Clear,
+    /// it may be inside the part, as after a press fit: the first step pushes the part out of it.
+    Overlap,
 }
 
 /// Shape of the tool in its own frame. Lengths in m, all > 0.

@@ -120,6 +120,10 @@ pub struct SessionSpec {
     pub holds: Holds,
     /// Tool in the world at the start, m.
     pub tool_pose: DPose3,
+    /// Whether the tool may start in the part.
+    pub may_overlap: bool,
+    /// Length unit of messages: its name, and m.
+    pub length_unit: (&'static str, f64),
     /// Approach of the held body.
     pub direction: DVec3,
     /// m/s.

@@ -350,6 +350,8 @@ pub fn session(scene: &Scene) -> SessionSpec {
             scene::Handle::Part => Holds::Part,
         },
         tool_pose: scene.tool.pose_part_tool,
+        may_overlap: scene.tool.start == scene::Start::Overlap,
+        length_unit: scene.length_unit(),
         direction: hand.direction,
         speed: hand.speed,
         travel: hand.travel,

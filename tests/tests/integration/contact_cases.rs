@@ -181,3 +181,126 @@ fn nodes_of_no_element_are_air_and_told() {
         outcome.err
     );
 }
+
+/// A plate whose top is at 5 mm, pushed by tools that just touch it.
+#[test]
+fn a_start_in_touch_is_a_start_and_rises_at_once() {
+    let tools = [
+        "shape = \"half-space\"\naxis = [0.0, 0.0, -1.0]\nposition = [0.015, 0.01, HEIGHT]",
+        "shape = \"cylinder\"\nradius = 0.01\naxis = [0, 1, 0]\nposition = [0.015, 0.01, 0.01 + HEIGHT]",
+        "shape = \"box\"\nhalf_extents = [0.02, 0.02, 0.01]\nposition = [0.015, 0.01, 0.01 + HEIGHT]",
+        "shape = \"box\"\nhalf_extents = [0.002, 0.002, 0.01]\nposition = [0.015, 0.01, 0.01 + HEIGHT]",
+    ];
+    let at = |tool: &str, gap: f64, more: &str| {
+        let height = if tool.contains("0.01 + ") {
+            0.015
+        } else {
+            0.005
+        } + gap;
+        let tool = tool.replace("0.01 + HEIGHT", "HEIGHT");
+        let tool = tool.replace("HEIGHT", &format!("{height:?}"));
+        scene("plate.msh", FIXED, &format!("{tool}\n{more}"), "")
+    };
+    let curve_of = |text: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let (outcome, _) = run_text(folder.path(), text);
+        assert_eq!(outcome.code, 0, "{}\n{text}", outcome.err);
+        let curve = snapin_tests::csv(&folder.path().join("result/force-travel.csv"));
+        curve.iter().find(|c| c.0 == "force_N").unwrap().1.clone()
+    };
+    for tool in tools {
+        let near = curve_of(&at(tool, 1e-9, ""));
+        for gap in [0.0, -1e-12, 1e-15] {
+            let force = curve_of(&at(tool, gap, ""));
+            // The coupling takes 1e4 N/m, and the first period moves the hand by 0.1 um.
+            let differences = force.iter().zip(&near).map(|(a, b)| (a - b).abs());
+            assert!(differences.fold(0.0, f64::max) < 1e-4, "{gap:e} {tool}");
+            assert!(
+                force[0] < 2e-3 && force[5] > 10.0 * force[0],
+                "{:?}",
+                &force[..6]
+            );
+        }
+        // Beyond rounding: refused with digits that show it, or wanted so.
+        let folder = tempfile::tempdir().unwrap();
+        let (outcome, _) = run_text(folder.path(), &at(tool, -2e-6, ""));
+        assert_eq!(outcome.code, 2, "{tool}: {}", outcome.err);
+        for part in ["starts inside", "2.0e-6 m", "tool.start = \"overlap\""] {
+            assert!(outcome.err.contains(part), "{tool}: {}", outcome.err);
+        }
+        let force = curve_of(&at(tool, -2e-6, "start = \"overlap\""));
+        assert!(
+            force[0] > 0.005,
+            "tight from the first step: {} N",
+            force[0]
+        );
+        let last = near.len() - 1;
+        assert!(
+            (force[last] - near[last]).abs() < 0.02,
+            "{} {}",
+            force[last],
+            near[last]
+        );
+    }
+}
+
+/// A pin of 1 mm is pushed into the middle of a face whose nodes are 3.4 mm away, and a hook under the edge of a lid of
+/// 0.5 mm, meshed at 1.4 mm, is 4 times too stiff (14.6 N, where a fine mesh and the beam formula have 3.1 N).
+#[test]
+fn a_smooth_tool_between_nodes_is_warned_of_with_its_depth() {
+    let warning = |text: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let (outcome, _) = run_text(folder.path(), text);
+        assert_eq!(outcome.code, 0, "{}", outcome.err);
+        let lines = outcome.err.lines().map(str::to_owned);
+        lines
+            .filter(|line| line.contains("one by one: force and work are wrong"))
+            .collect::<Vec<_>>()
+    };
+    let pin = "shape = \"sphere\"\nradius = 0.001\nposition = [0.018102, 0.016594, 0.0062]";
+    for order in ["1", "2"] {
+        let text = scene(
+            "coarse-block.msh",
+            FIXED,
+            pin,
+            &format!("[accuracy]\norder = {order}"),
+        );
+        let told = warning(&text.replace("travel = 0.001", "travel = 0.004"));
+        assert_eq!(told.len(), 1, "order {order}");
+        assert!(
+            told[0].contains("its radius is 1.000 mm where they are"),
+            "{told:?}"
+        );
+        assert!(told[0].contains("% of the travel)"), "{told:?}");
+    }
+    // Of the hook: the lid's edge of 0.5 mm, and a wheel of 6 mm, many nodes in its radius.
+    let lid = |radius: &str| {
+        let mesh = root().join("tests/data/contact/tapered-hook.msh");
+        format!(
+            "[part]\nmesh = {mesh:?}\n{FIXED}\nmaterial = {{ young_modulus = 1.815e9, poisson_ratio = 0.38 }}\n\
+             [tool]\nshape = \"cylinder\"\nradius = {radius}\nposition = [0.0255, {}, 0.0005]\n\
+             [hand]\ndirection = [-1, 0, 0]\nspeed = 0.02\ntravel = 0.0075\nstiffness = 1e6\ndamping = 1400.0\n\
+             rotational_stiffness = 2000.0\nrotational_damping = 3.0\n\
+             [coupling]\ntranslational_stiffness = 1e6\nrotational_stiffness = 2000.0\n[output]\nframes = 0\n",
+            0.0033 + radius.parse::<f64>().unwrap()
+        )
+    };
+    let told = warning(&lid("0.0005"));
+    assert!(
+        told.len() == 1 && told[0].contains("its radius is 0.5"),
+        "{told:?}"
+    );
+    assert_eq!(warning(&lid("0.006")).len(), 0);
+    assert_eq!(
+        warning(
+            &std::fs::read_to_string(root().join("scenes/hook.toml"))
+                .unwrap()
+                .replace(
+                    "\"hook.msh\"",
+                    &format!("{:?}", root().join("scenes/hook.msh"))
+                )
+        )
+        .len(),
+        0
+    );
+}

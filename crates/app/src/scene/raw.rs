@@ -13,7 +13,7 @@ use serde::de::{self, Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 mod accuracy;
 
 use super::error::{SceneError, line_of, plain, suggestion};
-use super::{DeviceModel, Handle, QuadratureRule, Units};
+use super::{DeviceModel, Handle, QuadratureRule, Start, Units};
 pub(super) use accuracy::{
     AccuracyKeys, AccuracyRaw, AdaptiveKeys, AdaptiveRaw, IterationsRaw, MethodRaw, MultiplyRaw,
     MultiplyScalarRaw, PresetRaw, RatesRaw, ScalarRaw, ToolFeaturesRaw,
@@ -417,6 +417,9 @@ pub(super) struct ToolRaw {
     /// The tool's rotation as a quaternion x, y, z, w, instead of `axis`; any length but 0.
     #[schemars(extend("x-quantity" = "number", "x-default" = "by `axis`"))]
     pub(super) rotation: Option<At<Vector<4>>>,
+    /// How the tool stands to the part before the first step.
+    #[serde(default)]
+    pub(super) start: Start,
 }
 
 #[derive(Debug, Default, serde::Deserialize, JsonSchema)]

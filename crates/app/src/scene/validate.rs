@@ -368,6 +368,7 @@ impl Check<'_> {
         Ok(Tool {
             shape,
             pose_part_tool,
+            start: raw.start,
         })
     }
 

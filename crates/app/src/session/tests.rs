@@ -31,10 +31,12 @@ fn engine() -> Engine {
     Engine::new(Arc::new(part), tool, Some(coupling), settings).unwrap()
 }
 
-fn spec() -> SessionSpec {
+pub(super) fn spec() -> SessionSpec {
     SessionSpec {
         holds: Holds::Tool,
         tool_pose: DPose3::from_translation(DVec3::new(0.0, 0.0, 4.99e-3)),
+        may_overlap: true,
+        length_unit: ("m", 1.0),
         direction: DVec3::NEG_Z,
         speed: 1e-3,
         travel: 1e-4,

@@ -245,6 +245,31 @@ fn what_cannot_be_timed_has_no_time_and_wins_nothing() {
     assert!(page.contains("<td>not timed</td>") && page.contains("Not timed, so not shown"));
 }
 
+/// A sharp bar over a hook ended the study in a panic of its reference: the reference's mesh has other contacts.
+#[test]
+fn the_study_of_a_tool_with_edges_comes_to_its_end() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("study");
+    let scene = root().join("scenes/edge.toml");
+    let mut args = vec!["accuracy", arg(&scene), "--out", arg(&out)];
+    args.extend(["--quick", "--no-cache", "--axes", "rates"]);
+    let outcome = snapin(&args);
+    assert_eq!(outcome.code, 0, "{}", outcome.err);
+    let study = json(&out);
+    assert!(study["reference"]["bar"].as_f64().unwrap() < 0.2, "{study}");
+    let rows = rows(&study);
+    assert!(rows[0]["step_us"]["p50"].as_f64().unwrap() > 0.0);
+    // Two rates do not go with edges: the rows say so, and win nothing.
+    for row in &rows[1..] {
+        let status = row["status"].as_str().unwrap();
+        assert!(
+            status.starts_with("not run: ") && status.contains("corners and edges"),
+            "{status}"
+        );
+        assert_eq!(row["step_us"], Value::Null);
+    }
+}
+
 #[test]
 fn a_folder_with_other_files_and_an_unknown_choice_are_refused() {
     let dir = tempfile::tempdir().unwrap();

@@ -57,8 +57,8 @@ impl Repeats {
     /// What was seen.
     pub(super) fn words(&self) -> String {
         format!(
-            "the same step, repeated, took {} times its shortest time in the middle, and {} % of the repeats over twice \
-             that",
+            "the same step, repeated, took {} times its shortest time in the middle, and more than twice its shortest \
+             in {} % of the repeats",
             short(self.typical),
             short(100.0 * self.disturbed)
         )

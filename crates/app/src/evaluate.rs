@@ -2,6 +2,8 @@
 
 mod drawing;
 mod moments;
+mod skin;
+pub(crate) mod strain;
 mod words;
 
 use glam::DVec3;
@@ -50,46 +52,24 @@ impl Story<'_> {
         let solver = FieldSolver::new(prepared, progress)?;
         let moments = Moments::of(recording);
         let mut between = BetweenNodes::new(prepared, self.engine);
-        let mut extremes = fem::stress::Extremes::default();
-        let mut look = |u: &[f64]| {
-            let here = solver.extremes(u);
-            extremes.max_principal_strain =
-                extremes.max_principal_strain.max(here.max_principal_strain);
-            extremes.max_rotation = extremes.max_rotation.max(here.max_rotation);
-        };
-        for index in moments.sampled() {
-            if crate::interrupt::is_requested() {
-                return Err(Error::Interrupted);
-            }
-            let record = &recording.records[index];
-            let u = solver.displacement(recording, record);
-            look(&u);
-            between.look(&u, &record.report.tool_pose);
-        }
+        let strained = self.strain(&solver, &moments.sampled(), &mut |u, record| {
+            between.look(u, &record.report.tool_pose);
+        })?;
+        let mut max_rotation = strained.max_rotation;
         let tool_extent = 0.4 * part_extent(&prepared.loaded.mesh);
         let mut frames = Vec::new();
-        for (label, index) in moments.labelled(scene.output.frames as usize) {
+        for (label, index) in moments.labelled(scene.output.frames as usize, strained.index) {
             let record = &recording.records[index];
             let u = solver.displacement(recording, record);
-            look(&u);
-            frames.push(self.frame(label, record, &u, solver.von_mises(&u), tool_extent));
+            max_rotation = max_rotation.max(solver.extremes(&u).max_rotation);
+            let mut frame = self.frame(label, record, &u, solver.von_mises(&u), tool_extent);
+            if strained.index == Some(index) {
+                frame.strain = solver.principal_strain(&u);
+            }
+            frames.push(frame);
         }
-
-        let strain = extremes.max_principal_strain;
-        if let Some(limit) = scene
-            .part
-            .material
-            .permissible_strain
-            .filter(|limit| strain > *limit)
-        {
-            self.remarks.push(format!(
-                "the largest strain of {:.2} % is beyond what the material bears ({:.2} %): the real \
-                 part yields, and the force is not to be trusted",
-                100.0 * strain,
-                100.0 * limit
-            ));
-        }
-        let observed = self.observed(&moments, extremes.max_rotation);
+        self.remarks.extend(strained.facts.remarks());
+        let observed = self.observed(&moments, max_rotation);
         let verdicts: Vec<Verdict> = judge(&observed)
             .into_iter()
             .filter(|v| choice(scene, v.name) == EffectChoice::Auto || v.missing)
@@ -129,12 +109,13 @@ impl Story<'_> {
                 prepare_s: prepared.total_seconds(),
                 from_cache: prepared.from_cache,
                 missed_deadlines: recording.servo.missed_deadlines,
-                max_principal_strain: strain,
-                max_rotation_deg: extremes.max_rotation.to_degrees(),
+                max_principal_strain: strained.facts.value(),
+                max_rotation_deg: max_rotation.to_degrees(),
                 rates: rate_facts(recording),
                 multiply: multiply_facts(self.shape),
             },
-            handbook: self.handbook(&rows),
+            handbook: self.handbook(&rows, strained.facts.value()),
+            strain: strained.facts,
             paper: paper(&rows),
             rows,
             part: drawing::part(&loaded.mesh),
@@ -218,6 +199,7 @@ impl Story<'_> {
             force_n: self.recording.resistance(record) + 0.0,
             displacement,
             von_mises,
+            strain: Vec::new(),
             contacts,
             tool: triangles.into_iter().map(|t| t.map(corner)).collect(),
         }
@@ -251,7 +233,7 @@ impl Story<'_> {
         }
     }
 
-    fn handbook(&self, rows: &[StepRow]) -> Option<Handbook> {
+    fn handbook(&self, rows: &[StepRow], strain: f64) -> Option<Handbook> {
         let hook = self.scene.handbook.as_ref()?;
         let young_modulus = self.scene.part.material.young_modulus;
         let frictionless = crate::scene::Handbook {
@@ -286,6 +268,12 @@ impl Story<'_> {
                 frictionless.deflection_force(young_modulus),
                 across,
                 "N",
+            ),
+            row(
+                "largest strain",
+                100.0 * frictionless.strain(),
+                100.0 * strain,
+                "%",
             ),
         ];
         if let ToolShape::Cylinder { radius, .. } = self.scene.tool.shape {

@@ -1,10 +1,13 @@
 //! Displacement, strain and stress of the whole part under recorded contact forces.
 
+use std::sync::OnceLock;
+
 use fem::stress::Extremes;
 use fem::{ConstrainedStiffness, FactoredStiffness, Hierarchy, Rule, Stiffness};
 use glam::DVec3;
 
 use crate::Error;
+use crate::evaluate::strain::{Moment, StrainPeaks, StrainReader};
 use crate::prepare::{LoadedPart, PreparedPart, assemble};
 use crate::session::{Record, Recording};
 
@@ -14,6 +17,8 @@ pub struct FieldSolver<'a> {
     loaded: &'a LoadedPart,
     solver: Solver<'a>,
     of_element: Vec<u32>,
+    /// Made when strain is first asked for.
+    strain: OnceLock<StrainReader<'a>>,
 }
 
 #[derive(Debug)]
@@ -59,6 +64,7 @@ impl<'a> FieldSolver<'a> {
             loaded,
             solver,
             of_element: vec![0; loaded.mesh.n_elements()],
+            strain: OnceLock::new(),
         })
     }
 
@@ -105,7 +111,21 @@ impl<'a> FieldSolver<'a> {
         )
     }
 
-    /// Largest strain, stress and rotation.
+    /// Largest strain at the skin by kind of place, with error, node and moment.
+    pub(crate) fn strain_peaks(&self, u: &[f64], moment: &Moment<'_>) -> StrainPeaks {
+        self.strain_reader().peaks(u, moment)
+    }
+
+    /// Largest principal strain by size at every node of the skin; not a number inside.
+    pub(crate) fn principal_strain(&self, u: &[f64]) -> Vec<f64> {
+        self.strain_reader().principal(u)
+    }
+
+    fn strain_reader(&self) -> &StrainReader<'a> {
+        self.strain.get_or_init(|| StrainReader::new(self.loaded))
+    }
+
+    /// Largest strain, stress and rotation at the integration points.
     pub fn extremes(&self, u: &[f64]) -> Extremes {
         Extremes::of(
             &self.loaded.mesh,

@@ -11,6 +11,7 @@ pub mod html;
 pub mod mcap_file;
 pub mod plot;
 pub mod render;
+pub mod strain;
 pub mod summary;
 pub mod vtu;
 pub mod work_precision;
@@ -28,12 +29,13 @@ pub use data::{
     StepRow, TwoRateFacts, View,
 };
 pub use error::ReportError;
+pub use strain::{PeakKind, StrainFacts, StrainPeak};
 
 /// Writes the whole result folder of `run` into the existing directory `dir`.
 ///
 /// Files: `report.html`, `force-travel.csv`, `force-travel.svg`, `timing.csv`, `step-time.svg`,
 /// `summary.json`, `session.mcap`, and below `frames` for each frame `NN-label.png` (displacement),
-/// `NN-label-stress.png` and `NN-label.vtu`; the larger ones as [`Outputs`] asks. Returns the
+/// `NN-label-stress.png` and `NN-label.vtu`, with `NN-label-strain.png` at the largest strain; the larger ones as [`Outputs`] asks. Returns the
 /// paths of what was written, in the order of writing. The same run gives the same bytes.
 ///
 /// # Errors
@@ -116,7 +118,7 @@ pub fn frame_stem(idx: usize, frame: &Frame) -> String {
     stem
 }
 
-/// Draws every frame twice, by displacement and by stress, on scales common to the run.
+/// Draws every frame by displacement and by stress, that of the largest strain by strain too, on scales common to the run.
 fn write_pictures(
     written: &mut Vec<PathBuf>,
     dir: &Path,
@@ -142,6 +144,9 @@ fn write_pictures(
         draw(render::Quantity::Displacement, format!("{stem}.png"))?;
         if !frame.von_mises.is_empty() {
             draw(render::Quantity::VonMises, format!("{stem}-stress.png"))?;
+        }
+        if !frame.strain.is_empty() {
+            draw(render::Quantity::Strain, format!("{stem}-strain.png"))?;
         }
     }
     Ok(pictures)
@@ -185,9 +190,10 @@ fn run_is_consistent(run: &Run) -> Result<(), ReportError> {
     }
     for frame in &run.frames {
         let (u, s) = (frame.displacement.len(), frame.von_mises.len());
-        if u != n_nodes || (s != n_nodes && s != 0) {
+        let e = frame.strain.len();
+        if u != n_nodes || (s != n_nodes && s != 0) || (e != n_nodes && e != 0) {
             return bad(format!(
-                "frame {:?} has {u} displacements and {s} stresses for {n_nodes} nodes",
+                "frame {:?} has {u} displacements, {s} stresses and {e} strains for {n_nodes} nodes",
                 frame.label
             ));
         }

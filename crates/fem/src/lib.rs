@@ -48,6 +48,8 @@ mod ordered;
 mod ordering;
 mod progress;
 pub mod quadrature;
+pub mod recovery;
+pub mod skin;
 mod stiffness;
 pub mod stress;
 mod supports;

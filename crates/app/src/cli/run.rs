@@ -103,7 +103,7 @@ fn text(run: &Run, curve: &Curve, shape: &Shape, target: &std::path::Path) -> St
     };
     format!(
         "{}\n  peak insertion force  {:.3} N at {:.3} mm of travel\n  snap drop             {:.3} N\n  \
-         insertion work        {:.3} mJ\n  coupling stiffness    {} N/m, in series with the part\n  \
+         insertion work        {:.3} mJ\n{}  coupling stiffness    {} N/m, in series with the part\n  \
          step                  median {:.1} us, 99 % below {:.1} us, over {} steps with contact\n  \
          {}multiply              {}\n  prepared in           {}{}\n  result                {}\n",
         run.title,
@@ -111,6 +111,7 @@ fn text(run: &Run, curve: &Curve, shape: &Shape, target: &std::path::Path) -> St
         1e3 * curve.travel_at_peak_m,
         curve.snap_drop_n,
         1e3 * curve.insertion_work_j,
+        run.strain.text(),
         run.facts.coupling_stiffness.unwrap_or(f64::INFINITY),
         at(0.5),
         at(0.99),

@@ -52,10 +52,11 @@ impl Moments {
         (0..count.min(span)).map(move |k| from + k * span / count.max(1))
     }
 
-    /// The named moments first, then what fills up to `count`, in order of time.
-    pub(super) fn labelled(&self, count: usize) -> Vec<(String, usize)> {
+    /// The named moments first, then what fills up to `count`, in order of time. `strained`: that of the largest strain.
+    pub(super) fn labelled(&self, count: usize, strained: Option<usize>) -> Vec<(String, usize)> {
         let named = [
             (self.peak, "peak"),
+            (strained, "largest strain"),
             (self.n.checked_sub(1), "home"),
             (self.pull, "pull"),
             (self.touch, "first contact"),

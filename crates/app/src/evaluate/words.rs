@@ -215,8 +215,8 @@ impl Story<'_> {
             "Travel is that of the held body in the simulation; the handle is ahead of it by the force \
              over the stiffness of the virtual coupling, which acts in series with the part."
                 .to_owned(),
-            "Contact is frictionless and quasi-static, displacements are linear; strain and rotation are \
-             the largest at the integration points."
+            "Contact is frictionless and quasi-static, displacements are linear; strain is recovered at the skin \
+             (superconvergent patch recovery), rotation is the largest at the integration points."
                 .to_owned(),
         ];
         notes.extend(self.picked.clone());

@@ -5,6 +5,7 @@
 
 use glam::DVec3;
 
+use super::strain::StrainFacts;
 use super::summary::Percentiles;
 
 /// Number of timed stages in a step; see [`STAGE_NAMES`].
@@ -39,6 +40,8 @@ pub struct Run {
     pub warnings: Vec<String>,
     /// Numbers about the part and the run as a whole.
     pub facts: Facts,
+    /// The largest strains, and what the material bears.
+    pub strain: StrainFacts,
     /// One row per step, in order of time.
     pub rows: Vec<StepRow>,
     /// What all pictures share.
@@ -79,7 +82,7 @@ pub struct Facts {
     pub from_cache: bool,
     /// Steps that ended after their servo period.
     pub missed_deadlines: u64,
-    /// Largest principal strain seen, 1 (0.01 is 1 %).
+    /// Largest principal strain of the free skin, 1 (0.01 is 1 %); [`StrainFacts::value`].
     pub max_principal_strain: f64,
     /// Largest rotation of a material point, degrees.
     pub max_rotation_deg: f64,
@@ -265,6 +268,8 @@ pub struct Frame {
     pub displacement: Vec<DVec3>,
     /// Von Mises stress at every node, Pa; empty where none was recovered.
     pub von_mises: Vec<f64>,
+    /// Largest principal strain by size at every node, not a number off the skin; empty where none was recovered.
+    pub strain: Vec<f64>,
     /// Forces of the contacts on the part.
     pub contacts: Vec<ContactForce>,
     /// The tool's surface in its pose, as corner points, m.

@@ -13,6 +13,7 @@ use super::curve::Curve;
 use super::data::{Effect, Handbook, PaperStage, Run};
 use super::plot::short;
 use super::render::Quantity;
+use super::strain::{self, StrainFacts, StrainPeak};
 use super::summary::{Percentiles, max_certificate, max_wrench_mismatch, stage_percentiles};
 
 /// Plots and pictures that go into the page.
@@ -63,6 +64,8 @@ pub fn page(run: &Run, curve: &Curve, drawings: &Drawings) -> String {
         section(&mut page, "Beside the handbook");
         handbook_table(&mut page, handbook);
     }
+    section(&mut page, "Strain");
+    strain_table(&mut page, &run.strain);
     if !drawings.pictures.is_empty() {
         section(&mut page, "Pictures");
         pictures(&mut page, run, &drawings.pictures);
@@ -146,7 +149,8 @@ the peak and stretches the drop, as a soft grip does.</li>\
 pulls, no node is inside the tool, no force without touch; scaled so that 1 is as large as the \
 forces and gaps themselves. <b>Imbalance</b> is by how much the force of the contacts on the tool \
 differs from that of the coupling, as a share of it.</li>\
-<li><b>Strain</b> tells whether the material stays elastic: compare with its permissible strain. \
+<li><b>Strain</b> tells whether the material stays elastic: compare with its permissible strain, and mind the bar, \
+which is the mesh's error. \
 <b>Rotation</b> tells whether small displacements are a fair assumption: see the effect \
 <i>large_rotation</i>.</li>\
 <li>In the pictures the shape is to scale. Colours reach from zero to the top of the scale, the same \
@@ -187,8 +191,14 @@ fn cards(page: &mut String, run: &Run, curve: &Curve) {
         (snaps.to_owned(), "snaps home"),
         (pull, "retention force"),
         (
-            format!("{} %", short(run.facts.max_principal_strain * 100.0)),
+            run.strain
+                .governing()
+                .map_or("none".into(), StrainPeak::percent),
             "largest strain",
+        ),
+        (
+            run.strain.safety_once().map_or("not given".into(), short),
+            "permissible over largest strain",
         ),
     ] {
         let _ = write!(
@@ -231,16 +241,21 @@ fn handbook_table(page: &mut String, handbook: &Handbook) {
     );
 }
 
+fn strain_table(page: &mut String, strain: &StrainFacts) {
+    let _ = writeln!(page, "<p>{}</p>", escaped(&strain.words()));
+    if !strain.peaks.is_empty() {
+        table(page, &strain::TABLE_HEADINGS, &strain.table(), &[], true);
+        let _ = writeln!(page, "<p>{}</p>", escaped(strain::CAPTION));
+    }
+}
+
 fn pictures(page: &mut String, run: &Run, pictures: &[Picture]) {
     page.push_str("<div class=\"pictures\">");
     for picture in pictures {
         let Some(frame) = run.frames.get(picture.frame) else {
             continue;
         };
-        let quantity = match picture.quantity {
-            Quantity::Displacement => "displacement",
-            Quantity::VonMises => "von Mises stress",
-        };
+        let quantity = picture.quantity.name();
         let caption = escaped(&format!(
             "{}: {quantity} at {} mm travel, {} N",
             frame.label,
@@ -299,7 +314,13 @@ fn key_numbers(page: &mut String, run: &Run, curve: &Curve) {
         ),
         (
             "largest principal strain",
-            format!("{} %", short(facts.max_principal_strain * 100.0)),
+            run.strain
+                .governing()
+                .map_or("none".into(), StrainPeak::percent),
+        ),
+        (
+            "safety against permissible strain",
+            run.strain.safety_words(),
         ),
         (
             "largest rotation",

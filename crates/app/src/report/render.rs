@@ -41,6 +41,19 @@ pub enum Quantity {
     Displacement,
     /// Von Mises stress, MPa.
     VonMises,
+    /// Largest principal strain by size, %.
+    Strain,
+}
+
+impl Quantity {
+    /// In captions.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Displacement => "displacement",
+            Self::VonMises => "von Mises stress",
+            Self::Strain => "principal strain",
+        }
+    }
 }
 
 /// What all pictures of a run share, so that they can be compared and played one after another:
@@ -53,6 +66,8 @@ pub struct Scene {
     displacement_top: f64,
     /// Top of the colour scale, Pa.
     stress_top: f64,
+    /// Top of the colour scale, 1: the largest of the free skin; contacts and inner edges may lie beyond it.
+    strain_top: f64,
     /// Largest contact force of all frames, N.
     force_max: f64,
     /// Surface nodes, sorted.
@@ -105,6 +120,7 @@ impl Scene {
             camera: Camera::fit(&run.view, &points, STAGE.map(|v| v * SAMPLES as f64)),
             displacement_top,
             stress_top,
+            strain_top: run.strain.value(),
             force_max,
             surface_nodes,
         }
@@ -144,12 +160,12 @@ impl Scene {
                 let stress = frame.von_mises.iter().map(|s| s / 1e6).collect();
                 ("MPa", 1e-6, self.stress_top, stress)
             }
+            Quantity::Strain => {
+                let strain = frame.strain.iter().map(|e| 100.0 * e).collect();
+                ("%", 100.0, self.strain_top, strain)
+            }
         };
-        let name = match quantity {
-            Quantity::Displacement => "displacement",
-            Quantity::VonMises => "von Mises stress",
-        };
-        let bar = ColourBar::new(name, unit, top * factor);
+        let bar = ColourBar::new(quantity.name(), unit, top * factor);
 
         let mut canvas = Canvas::new(width, height);
         let nodes: Vec<DVec3> = part

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::curve::Curve;
 use super::data::{MultiplyFacts, RateFacts, Run, STAGE_NAMES, StepRow};
+use super::strain;
 
 /// Order statistics of one stage's time, µs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -82,6 +83,7 @@ struct Summary<'a> {
     net_work_J: f64,
     coupling_stiffness_N_per_m: Option<f64>,
     max_principal_strain: f64,
+    strain: strain::StrainSummary,
     max_rotation_deg: f64,
     max_certificate: f64,
     max_wrench_mismatch_rel: f64,
@@ -200,6 +202,7 @@ pub fn json(run: &Run, curve: &Curve) -> String {
         net_work_J: curve.net_work_j,
         coupling_stiffness_N_per_m: facts.coupling_stiffness,
         max_principal_strain: facts.max_principal_strain,
+        strain: strain::summary(&run.strain),
         max_rotation_deg: facts.max_rotation_deg,
         max_certificate: max_certificate(&run.rows),
         max_wrench_mismatch_rel: max_wrench_mismatch(&run.rows),
@@ -329,6 +332,7 @@ mod tests {
             "net_work_J",
             "coupling_stiffness_N_per_m",
             "max_principal_strain",
+            "strain",
             "max_rotation_deg",
             "max_certificate",
             "max_wrench_mismatch_rel",

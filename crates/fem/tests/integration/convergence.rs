@@ -26,9 +26,9 @@ use fem::{FactoredStiffness, Group, Material, Mesh, Order, Quadrature, Silent, S
 
 use crate::common::assemble;
 
-const INNER: f64 = 0.010;
-const OUTER: f64 = 0.020;
-const PRESSURE: f64 = 10e6;
+pub(crate) const INNER: f64 = 0.010;
+pub(crate) const OUTER: f64 = 0.020;
+pub(crate) const PRESSURE: f64 = 10e6;
 const YOUNG: f64 = 2.3e9;
 const POISSON: f64 = 0.37;
 
@@ -39,13 +39,17 @@ fn constants() -> (f64, f64) {
     (common * (1.0 - 2.0 * POISSON), common * b2)
 }
 
+pub(crate) fn material() -> Material {
+    Material::new(YOUNG, POISSON).unwrap()
+}
+
 fn displacement([x, y, _]: [f64; 3]) -> [f64; 3] {
     let (a, b) = constants();
     let factor = a + b / (x * x + y * y);
     [factor * x, factor * y, 0.0]
 }
 
-fn strain([x, y, _]: [f64; 3]) -> Tensor {
+pub(crate) fn strain([x, y, _]: [f64; 3]) -> Tensor {
     let (a, b) = constants();
     let r2 = x * x + y * y;
     let (uniform, shear) = (a + b / r2, -2.0 * b * x * y / (r2 * r2));
@@ -57,7 +61,7 @@ fn strain([x, y, _]: [f64; 3]) -> Tensor {
 }
 
 /// The ring with `n` cells across its wall, its supports, and the group `inner`.
-fn ring(order: Order, n: usize) -> (Mesh, Supports) {
+pub(crate) fn ring(order: Order, n: usize) -> (Mesh, Supports) {
     const PATHS: [[usize; 3]; 6] = [
         [0, 1, 2],
         [1, 2, 0],
@@ -143,7 +147,7 @@ fn ring(order: Order, n: usize) -> (Mesh, Supports) {
 fn errors(order: Order, n: usize) -> [f64; 2] {
     let (mesh, supports) = ring(order, n);
     assert_eq!(mesh.check(&supports), Ok(vec![]));
-    let material = Material::new(YOUNG, POISSON).unwrap();
+    let material = material();
     let of_element = vec![0; mesh.n_elements()];
     let stiffness = assemble(&mesh, material, Quadrature::Converged);
     let factor = FactoredStiffness::new(&stiffness, &supports, &Silent).unwrap();
@@ -203,7 +207,7 @@ fn ring_tet20_converges_with_orders_3_and_4() {
 /// (b² + a²) / (b² - a²) p = 16.667 MPa at the inner radius, no radial stress at the outer one.
 #[test]
 fn the_closed_form_has_the_numbers_of_the_book() {
-    let material = Material::new(YOUNG, POISSON).unwrap();
+    let material = material();
     let stress = |r: f64| fem::stress::stress(&material, &strain([r, 0.0, 0.0]));
     assert!((displacement([INNER, 0.0, 0.0])[0] - 0.084583e-3).abs() < 5e-10);
     assert!((stress(INNER)[1][1] - 5.0 / 3.0 * PRESSURE).abs() < 1e-12 * PRESSURE);

@@ -13,6 +13,7 @@ mod quality;
 mod raise;
 mod raise_refused;
 mod reader;
+mod recovery;
 mod reference;
 mod refine;
 mod relations;

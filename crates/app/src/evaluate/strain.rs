@@ -1,0 +1,274 @@
+//! The largest strains of a run: recovered at the skin, by kind of place, over all moments.
+
+use std::collections::BTreeSet;
+
+use fem::recovery::Recovery;
+use fem::stress::largest_principal;
+
+use super::Story;
+use super::skin::{Marks, widened};
+use crate::Error;
+use crate::fields::FieldSolver;
+use crate::prepare::LoadedPart;
+use crate::report::{PeakKind, StrainFacts, StrainPeak};
+use crate::session::Record;
+
+/// What strain needs of a part; made once.
+#[derive(Debug)]
+pub(crate) struct StrainReader<'a> {
+    loaded: &'a LoadedPart,
+    recovery: Recovery<'a>,
+    marks: Marks,
+}
+
+/// Largest strain of each kind of place, so far.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct StrainPeaks {
+    peaks: Vec<StrainPeak>,
+}
+
+/// A moment: which nodes carry contact force, and what the hand feels.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Moment<'m> {
+    /// Node indices.
+    pub(crate) contacts: &'m [u32],
+    /// m.
+    pub(crate) travel_m: f64,
+    /// N.
+    pub(crate) force_n: f64,
+}
+
+impl<'a> StrainReader<'a> {
+    pub(crate) fn new(loaded: &'a LoadedPart) -> Self {
+        let recovery = Recovery::new(&loaded.mesh);
+        let marks = Marks::of(&loaded.mesh, &loaded.supports, recovery.faces());
+        Self {
+            loaded,
+            recovery,
+            marks,
+        }
+    }
+
+    /// The largest strain of each kind of place under a displacement (3 node + component, m).
+    pub(crate) fn peaks(&self, u: &[f64], moment: &Moment<'_>) -> StrainPeaks {
+        let strain = self.recovery.strain(u);
+        let mut is_near = vec![false; self.loaded.mesh.n_nodes()];
+        moment
+            .contacts
+            .iter()
+            .for_each(|&n| is_near[n as usize] = true);
+        // A node between two vertices has few faces of its own, hence twice.
+        let is_near = widened(
+            self.recovery.faces(),
+            &widened(self.recovery.faces(), &is_near),
+        );
+        let mut best: [Option<(f64, usize)>; 4] = [None; 4];
+        for (i, (tensor, &node)) in strain
+            .at_nodes()
+            .iter()
+            .zip(self.recovery.nodes())
+            .enumerate()
+        {
+            let kind = self.kind(node as usize, &is_near);
+            let value = largest_principal(tensor);
+            let best = &mut best[kind as usize];
+            if best.is_none_or(|(most, _)| value > most) {
+                *best = Some((value, i));
+            }
+        }
+        let peaks = PeakKind::ALL.into_iter().filter_map(|kind| {
+            let (value, i) = best[kind as usize]?;
+            let node = self.recovery.nodes()[i] as usize;
+            Some(StrainPeak {
+                value,
+                error: strain.error(i),
+                place: self.loaded.mesh.nodes[node],
+                node_tag: self.loaded.mesh.node_tags[node],
+                travel_m: moment.travel_m,
+                force_n: moment.force_n,
+                kind,
+            })
+        });
+        StrainPeaks {
+            peaks: peaks.collect(),
+        }
+    }
+
+    fn kind(&self, node: usize, is_near_contact: &[bool]) -> PeakKind {
+        if is_near_contact[node] {
+            PeakKind::AtContact
+        } else if self.marks.held[node] {
+            PeakKind::AtHeld
+        } else if self.marks.inner[node] {
+            PeakKind::AtInnerEdge
+        } else {
+            PeakKind::Free
+        }
+    }
+
+    /// Largest principal strain by size at every node of the skin, for pictures; not a number inside.
+    pub(crate) fn principal(&self, u: &[f64]) -> Vec<f64> {
+        let mut values = vec![f64::NAN; self.loaded.mesh.n_nodes()];
+        let strain = self.recovery.strain(u);
+        for (tensor, &node) in strain.at_nodes().iter().zip(self.recovery.nodes()) {
+            values[node as usize] = largest_principal(tensor);
+        }
+        values
+    }
+}
+
+impl StrainPeaks {
+    /// Keeps the larger of each kind.
+    pub(crate) fn merge(&mut self, other: &Self) {
+        for peak in &other.peaks {
+            match self.peaks.iter_mut().find(|p| p.kind == peak.kind) {
+                Some(own) if own.value >= peak.value => {}
+                Some(own) => *own = *peak,
+                None => self.peaks.push(*peak),
+            }
+        }
+    }
+
+    /// Largest of the free skin, or of all where there is none; 0 of nothing.
+    pub(crate) fn value(&self) -> f64 {
+        let free = self.peaks.iter().find(|p| p.kind == PeakKind::Free);
+        free.map_or_else(
+            || self.peaks.iter().map(|p| p.value).fold(0.0, f64::max),
+            |p| p.value,
+        )
+    }
+
+    /// All, for the report.
+    pub(crate) fn into_vec(self) -> Vec<StrainPeak> {
+        self.peaks
+    }
+}
+
+/// What a run's strains come to.
+pub(super) struct Strained {
+    pub(super) facts: StrainFacts,
+    /// Record of the largest strain; `None` if nothing was strained.
+    pub(super) index: Option<usize>,
+    /// Largest rotation at the integration points, rad.
+    pub(super) max_rotation: f64,
+}
+
+impl Story<'_> {
+    /// Solves for the sampled records, and for more around the one with the largest strain; `also` sees each of them.
+    pub(super) fn strain(
+        &self,
+        solver: &FieldSolver<'_>,
+        sampled: &[usize],
+        also: &mut dyn FnMut(&[f64], &Record),
+    ) -> Result<Strained, Error> {
+        let recording = self.recording;
+        let mut peaks = StrainPeaks::default();
+        let mut max_rotation = 0.0f64;
+        let mut seen = BTreeSet::new();
+        let mut look = |index: usize| {
+            if crate::interrupt::is_requested() {
+                return Err(Error::Interrupted);
+            }
+            let record = &recording.records[index];
+            let u = solver.displacement(recording, record);
+            max_rotation = max_rotation.max(solver.extremes(&u).max_rotation);
+            also(&u, record);
+            let candidates = &self.prepared.loaded.candidates;
+            let contacts: Vec<u32> = recording
+                .contacts(record)
+                .iter()
+                .map(|c| candidates[c.candidate as usize])
+                .collect();
+            let here = solver.strain_peaks(
+                &u,
+                &Moment {
+                    contacts: &contacts,
+                    travel_m: record.travel,
+                    force_n: recording.resistance(record) + 0.0,
+                },
+            );
+            peaks.merge(&here);
+            seen.insert(index);
+            Ok(here.value())
+        };
+        let values = sampled
+            .iter()
+            .map(|&index| look(index))
+            .collect::<Result<Vec<f64>, Error>>()?;
+        let index = search_peak(sampled, &values, &mut look)?;
+        let facts = StrainFacts {
+            peaks: peaks.into_vec(),
+            permissible: self.scene.part.material.permissible_strain,
+            n_moments: seen.len(),
+        };
+        Ok(Strained {
+            index: index.filter(|_| facts.value() > 0.0),
+            facts,
+            max_rotation,
+        })
+    }
+}
+
+/// Looks closer around the largest of some sampled steps: golden section between its neighbours, until they are adjacent.
+/// `values`: of the sampled steps, which are ascending; `look`: value of any step. Where the largest was found.
+///
+/// # Errors
+/// Those of `look`.
+pub(crate) fn search_peak<E>(
+    sampled: &[usize],
+    values: &[f64],
+    mut look: impl FnMut(usize) -> Result<f64, E>,
+) -> Result<Option<usize>, E> {
+    let Some(k) = (0..values.len()).max_by(|&a, &b| values[a].total_cmp(&values[b])) else {
+        return Ok(None);
+    };
+    let (mut middle, mut most) = (sampled[k], values[k]);
+    let mut low = sampled[k.saturating_sub(1)];
+    let mut high = sampled[(k + 1).min(sampled.len() - 1)];
+    while middle - low > 1 || high - middle > 1 {
+        let is_left = middle - low > high - middle;
+        let span = if is_left { middle - low } else { high - middle };
+        let step = ((0.382 * span as f64) as usize).max(1);
+        let next = if is_left {
+            middle - step
+        } else {
+            middle + step
+        };
+        let value = look(next)?;
+        if value > most {
+            if is_left {
+                high = middle;
+            } else {
+                low = middle;
+            }
+            (middle, most) = (next, value);
+        } else if is_left {
+            low = next;
+        } else {
+            high = next;
+        }
+    }
+    Ok(Some(middle))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_between_samples_is_found_in_few_looks() {
+        for summit in [3usize, 111, 250, 617, 998] {
+            let force = |i: usize| 1.0 - (i as f64 - summit as f64).abs().powf(1.3);
+            let sampled: Vec<usize> = (0..1000).step_by(70).chain([999]).collect();
+            let values: Vec<f64> = sampled.iter().map(|&i| force(i)).collect();
+            let mut looks = 0;
+            let found = search_peak::<()>(&sampled, &values, |i| {
+                looks += 1;
+                Ok(force(i))
+            });
+            assert_eq!(found, Ok(Some(summit)));
+            assert!(looks <= 20, "{looks}");
+        }
+        assert_eq!(search_peak::<()>(&[], &[], |_| Ok(0.0)), Ok(None));
+    }
+}

@@ -1,0 +1,338 @@
+//! What a run tells of strain: the largest, where and when, how sure it is, and what the material bears.
+
+use serde::Serialize;
+
+use super::plot::short;
+
+/// What separates a place whose strain can be trusted from one whose strain grows as the mesh is refined.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PeakKind {
+    /// None of the others: the strain converges as the mesh is refined.
+    Free,
+    /// Within about an element of a node that carries contact force: point loads strain without bound.
+    AtContact,
+    /// Within an element of the border of a held region.
+    AtHeld,
+    /// Within an element of an inner edge without a fillet.
+    AtInnerEdge,
+}
+
+impl PeakKind {
+    /// All, in the order of the tables.
+    pub const ALL: [Self; 4] = [Self::Free, Self::AtContact, Self::AtHeld, Self::AtInnerEdge];
+
+    /// In tables.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Free => "largest strain",
+            Self::AtContact => "at contact nodes",
+            Self::AtHeld => "at the border of a held region",
+            Self::AtInnerEdge => "at an inner edge without a fillet",
+        }
+    }
+
+    /// Why the number is told apart; empty for the one that is the result.
+    pub fn why(self) -> &'static str {
+        match self {
+            Self::Free => "",
+            Self::AtContact => {
+                "forces act at single nodes: their strain depends on the fineness of the mesh"
+            }
+            Self::AtHeld | Self::AtInnerEdge => "grows without bound as the mesh is refined",
+        }
+    }
+}
+
+/// The largest principal strain (by size) of one kind of place, with its place and moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StrainPeak {
+    /// Recovered at the skin, 1 (0.01 is 1 %), >= 0.
+    pub value: f64,
+    /// Estimated error of `value`, 1, >= 0.
+    pub error: f64,
+    /// Of the node at rest, m, part's frame.
+    pub place: [f64; 3],
+    /// Tag of the node in the mesh file, or in the mesh as it was raised or refined.
+    pub node_tag: u64,
+    /// Travel of the held body at that moment, m.
+    pub travel_m: f64,
+    /// Force at the hand at that moment, positive when it resists, N.
+    pub force_n: f64,
+    /// What kind of place it is.
+    pub kind: PeakKind,
+}
+
+impl StrainPeak {
+    /// "0.553 ± 0.061 %".
+    pub fn percent(&self) -> String {
+        format!(
+            "{} ± {} %",
+            short(100.0 * self.value),
+            short(100.0 * self.error)
+        )
+    }
+
+    /// Node, coordinates in mm, travel in mm and force in N.
+    pub fn where_and_when(&self) -> String {
+        let [x, y, z] = self.place.map(|c| short(1e3 * c + 0.0));
+        format!(
+            "node {} at ({x}, {y}, {z}) mm, at {} mm of travel and {} N",
+            self.node_tag,
+            short(1e3 * self.travel_m + 0.0),
+            short(self.force_n + 0.0),
+        )
+    }
+}
+
+/// Share of the strain for single use that snap joints bear when they are opened and closed often: "about 60 %" (Covestro,
+/// formerly Bayer MaterialScience, "Snap-Fit Joints for Plastics: A Design Guide").
+pub const REPEATED_SHARE: f64 = 0.6;
+
+/// Largest strains of a run by kind, beside what the material bears.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StrainFacts {
+    /// One of each kind that occurred.
+    pub peaks: Vec<StrainPeak>,
+    /// Largest strain that the material bears once, if the scene gives it.
+    pub permissible: Option<f64>,
+    /// Moments that were looked at.
+    pub n_moments: usize,
+}
+
+impl StrainFacts {
+    /// The largest of a kind.
+    pub fn of(&self, kind: PeakKind) -> Option<&StrainPeak> {
+        self.peaks.iter().find(|p| p.kind == kind)
+    }
+
+    /// The result: the largest of the free skin; where the part has no such place, the largest of all.
+    pub fn governing(&self) -> Option<&StrainPeak> {
+        let of_all = || {
+            let peaks = self.peaks.iter();
+            peaks.max_by(|a, b| a.value.total_cmp(&b.value))
+        };
+        self.of(PeakKind::Free).or_else(of_all)
+    }
+
+    /// Value of [`StrainFacts::governing`]; 0 for a part that was not strained.
+    pub fn value(&self) -> f64 {
+        self.governing().map_or(0.0, |p| p.value)
+    }
+
+    /// Permissible over largest strain, for single use; `None` without a permissible strain or without strain.
+    pub fn safety_once(&self) -> Option<f64> {
+        self.permissible
+            .map(|limit| limit / self.value())
+            .filter(|s| s.is_finite())
+    }
+
+    /// The same for a joint that is opened and closed often.
+    pub fn safety_repeated(&self) -> Option<f64> {
+        self.safety_once().map(|s| REPEATED_SHARE * s)
+    }
+
+    /// "safety 3.61 once, 2.17 repeatedly".
+    pub fn safety_words(&self) -> String {
+        match (self.permissible, self.safety_once(), self.safety_repeated()) {
+            (Some(limit), Some(once), Some(repeated)) => format!(
+                "safety {} once, {} repeatedly, against {} %",
+                short(once),
+                short(repeated),
+                short(100.0 * limit)
+            ),
+            (Some(_), ..) => "not strained".to_owned(),
+            (None, ..) => {
+                "no safety: no permissible strain given (part.material.permissible_strain)"
+                    .to_owned()
+            }
+        }
+    }
+
+    /// Sentence above the table.
+    pub fn words(&self) -> String {
+        match self.governing() {
+            Some(peak) => format!(
+                "{}: {}; {}. {} moments were looked at.",
+                peak.percent(),
+                peak.where_and_when(),
+                self.safety_words(),
+                self.n_moments
+            ),
+            None => "Nothing was strained.".to_owned(),
+        }
+    }
+
+    /// Lines for the terminal, each with its end.
+    pub fn text(&self) -> String {
+        let Some(peak) = self.governing() else {
+            return "  largest strain        none: nothing was strained\n".to_owned();
+        };
+        let mut text = format!(
+            "  largest strain        {}, {}\n                        {}\n",
+            peak.percent(),
+            self.safety_words(),
+            peak.where_and_when()
+        );
+        if peak.kind != PeakKind::Free {
+            text += &format!(
+                "                        {}: {}\n",
+                peak.kind.words(),
+                peak.kind.why()
+            );
+        }
+        for other in self.larger_elsewhere() {
+            text += &format!(
+                "                        {} {}: {}\n",
+                other.percent(),
+                other.kind.words(),
+                other.kind.why()
+            );
+        }
+        text
+    }
+
+    /// What the reader must not miss.
+    pub fn remarks(&self) -> Vec<String> {
+        let mut remarks = Vec::new();
+        let Some((peak, limit)) = self.governing().zip(self.permissible) else {
+            return remarks;
+        };
+        if peak.value > limit {
+            remarks.push(format!(
+                "the largest strain of {:.2} % is beyond what the material bears ({:.2} %): the real \
+                 part yields, and the force is not to be trusted",
+                100.0 * peak.value,
+                100.0 * limit
+            ));
+        } else if peak.value + peak.error > limit {
+            remarks.push(format!(
+                "the largest strain of {} may be beyond what the material bears ({:.2} %): the bar is the mesh's; raise \
+                 accuracy.order or refine the mesh near node {}",
+                peak.percent(),
+                100.0 * limit,
+                peak.node_tag
+            ));
+        }
+        remarks
+    }
+
+    /// Peaks of other kinds that exceed the result.
+    fn larger_elsewhere(&self) -> impl Iterator<Item = &StrainPeak> {
+        let value = self.value();
+        self.peaks.iter().filter(move |p| p.value > value)
+    }
+
+    /// Rows of the report's table: what, strain with its bar, safety once, node, place in mm, travel in mm, force in N, why.
+    pub fn table(&self) -> Vec<Vec<String>> {
+        PeakKind::ALL
+            .into_iter()
+            .filter_map(|kind| self.of(kind))
+            .map(|p| {
+                let safety = self.permissible.map(|limit| limit / p.value);
+                vec![
+                    p.kind.words().to_owned(),
+                    p.percent(),
+                    safety
+                        .filter(|s| s.is_finite())
+                        .map_or("not given".to_owned(), short),
+                    p.node_tag.to_string(),
+                    p.place.map(|c| short(1e3 * c + 0.0)).join(", "),
+                    short(1e3 * p.travel_m + 0.0),
+                    short(p.force_n + 0.0),
+                    p.kind.why().to_owned(),
+                ]
+            })
+            .collect()
+    }
+}
+
+/// Headings of [`StrainFacts::table`].
+pub const TABLE_HEADINGS: [&str; 8] = [
+    "",
+    "strain",
+    "safety once",
+    "node",
+    "place (mm)",
+    "travel (mm)",
+    "force (N)",
+    "",
+];
+
+/// What the table's numbers are.
+pub const CAPTION: &str = "Largest principal strain by size, recovered at the nodes of the skin by superconvergent patch \
+    recovery (Zienkiewicz and Zhu 1992), with the estimated error of the mesh: compare its value, not its bar, with other \
+    runs. Strain within about an element of contact nodes, of borders of held regions and of inner edges without a fillet \
+    has no limit as the mesh is refined, and is told apart: model the fillet, or read the strain beside it. For repeated \
+    use the safety is 60 % of that for single use.";
+
+#[derive(Serialize)]
+#[expect(
+    non_snake_case,
+    reason = "keys of the file carry their unit in its own letters"
+)]
+struct PeakSummary {
+    value: f64,
+    error: f64,
+    node: u64,
+    place_m: [f64; 3],
+    travel_m: f64,
+    force_N: f64,
+}
+
+/// The object `strain` of `summary.json`.
+#[derive(Serialize)]
+#[expect(
+    non_snake_case,
+    reason = "keys of the file carry their unit in its own letters"
+)]
+pub(super) struct StrainSummary {
+    value: f64,
+    error: Option<f64>,
+    node: Option<u64>,
+    place_m: Option<[f64; 3]>,
+    travel_m: Option<f64>,
+    force_N: Option<f64>,
+    kind: Option<&'static str>,
+    at_contact: Option<PeakSummary>,
+    at_held: Option<PeakSummary>,
+    at_inner_edge: Option<PeakSummary>,
+    permissible: Option<f64>,
+    safety_once: Option<f64>,
+    safety_repeated: Option<f64>,
+    moments: usize,
+}
+
+pub(super) fn summary(facts: &StrainFacts) -> StrainSummary {
+    let peak = facts.governing();
+    let of = |kind| {
+        facts.of(kind).map(|p| PeakSummary {
+            value: p.value,
+            error: p.error,
+            node: p.node_tag,
+            place_m: p.place,
+            travel_m: p.travel_m,
+            force_N: p.force_n,
+        })
+    };
+    StrainSummary {
+        value: facts.value(),
+        error: peak.map(|p| p.error),
+        node: peak.map(|p| p.node_tag),
+        place_m: peak.map(|p| p.place),
+        travel_m: peak.map(|p| p.travel_m),
+        force_N: peak.map(|p| p.force_n),
+        kind: peak.map(|p| match p.kind {
+            PeakKind::Free => "free",
+            PeakKind::AtContact => "at_contact",
+            PeakKind::AtHeld => "at_held",
+            PeakKind::AtInnerEdge => "at_inner_edge",
+        }),
+        at_contact: of(PeakKind::AtContact),
+        at_held: of(PeakKind::AtHeld),
+        at_inner_edge: of(PeakKind::AtInnerEdge),
+        permissible: facts.permissible,
+        safety_once: facts.safety_once(),
+        safety_repeated: facts.safety_repeated(),
+        moments: facts.n_moments,
+    }
+}

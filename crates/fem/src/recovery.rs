@@ -221,6 +221,24 @@ impl RecoveredStrain<'_> {
         recovery.blend(&self.coefficients, &shares, x, false)
     }
 
+    /// The largest [`RecoveredStrain::error`] of the faces at the `i`-th node of [`Recovery::nodes`]. For the largest strain
+    /// of a part: at a single node both fits may agree by chance.
+    ///
+    /// # Panics
+    /// If there is no such node.
+    pub fn error_around(&self, i: usize) -> f64 {
+        let recovery = self.recovery;
+        let node = recovery.nodes[i];
+        let faces = recovery.faces.iter().filter(|f| f.nodes.contains(&node));
+        let mut around: Vec<u32> = faces.flat_map(|f| &f.nodes).copied().collect();
+        around.sort_unstable();
+        around.dedup();
+        let places = around
+            .iter()
+            .filter_map(|n| recovery.nodes.binary_search(n).ok());
+        places.map(|k| self.error(k)).fold(self.error(i), f64::max)
+    }
+
     /// Estimated error of the principal strains at the `i`-th node of [`Recovery::nodes`]: the larger of
     ///
     /// ```text

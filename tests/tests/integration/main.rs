@@ -15,6 +15,7 @@ mod random_scenes;
 mod scenes;
 mod shape_on_gpu;
 mod storage;
+mod strain;
 mod tool_features;
 mod two_rates;
 mod verify;

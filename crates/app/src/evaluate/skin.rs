@@ -96,3 +96,74 @@ fn is_border(edge: &SkinEdge, holds: &[Hold]) -> bool {
 fn is_inner(edge: &SkinEdge, holds: &[Hold]) -> bool {
     edge.turn > SHARP && edge.faces.iter().all(|&f| holds[f as usize] == Hold::Free)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fem::Order;
+
+    /// The unit cube in six tetrahedra, its vertices numbered x + 2 y + 4 z.
+    fn cube() -> Mesh {
+        let nodes = (0..8u32).map(|i| [i & 1, i >> 1 & 1, i >> 2].map(f64::from));
+        let elements = [
+            [0, 1, 3, 7],
+            [0, 2, 6, 7],
+            [0, 4, 5, 7],
+            [0, 3, 2, 7],
+            [0, 6, 4, 7],
+            [0, 5, 1, 7],
+        ];
+        Mesh::new(
+            Order::Linear,
+            nodes.collect(),
+            (1..=8).collect(),
+            elements.concat(),
+            (1..=6).collect(),
+            vec![],
+        )
+    }
+
+    fn held(components: [bool; 3]) -> usize {
+        let mesh = cube();
+        let mut supports = Supports::new(8);
+        for node in [0, 2, 4, 6] {
+            supports.fix_node(node, components);
+        }
+        let marks = Marks::of(&mesh, &supports, &mesh.boundary_faces());
+        assert!(marks.inner.iter().all(|m| !m));
+        marks.held.iter().filter(|m| **m).count()
+    }
+
+    #[test]
+    fn a_clamped_face_has_a_border_and_a_plane_of_symmetry_has_none() {
+        assert_eq!(held([true, false, false]), 0);
+        assert_eq!(held([true; 3]), 8);
+        assert_eq!(held([false, true, false]), 8);
+        assert_eq!(held([false; 3]), 0);
+    }
+
+    /// A line of nodes that is held by itself strains without bound too.
+    #[test]
+    fn a_held_line_is_a_border() {
+        let mesh = cube();
+        let mut supports = Supports::new(8);
+        supports.fix_node(1, [true; 3]);
+        supports.fix_node(3, [true; 3]);
+        let marks = Marks::of(&mesh, &supports, &mesh.boundary_faces());
+        assert!(marks.held[1] && marks.held[3]);
+        assert!(!marks.held[4]);
+    }
+
+    /// A free face level with a plane of symmetry: mirrored, the body is hollow there.
+    #[test]
+    fn a_plane_of_symmetry_that_ends_in_the_middle_of_a_face_has_a_border() {
+        let mesh = cube();
+        let mut supports = Supports::new(8);
+        // Half of the face x = 0, which is two triangles.
+        for node in [0, 2, 6] {
+            supports.fix_node(node, [true, false, false]);
+        }
+        let marks = Marks::of(&mesh, &supports, &mesh.boundary_faces());
+        assert!(marks.held[0] && marks.held[6]);
+    }
+}

@@ -81,7 +81,7 @@ impl<'a> StrainReader<'a> {
             let node = self.recovery.nodes()[i] as usize;
             Some(StrainPeak {
                 value,
-                error: strain.error(i),
+                error: strain.error_around(i),
                 place: self.loaded.mesh.nodes[node],
                 node_tag: self.loaded.mesh.node_tags[node],
                 travel_m: moment.travel_m,
@@ -173,11 +173,11 @@ impl Story<'_> {
             let u = solver.displacement(recording, record);
             max_rotation = max_rotation.max(solver.extremes(&u).max_rotation);
             also(&u, record);
-            let candidates = &self.prepared.loaded.candidates;
+            let loaded = &self.prepared.loaded;
             let contacts: Vec<u32> = recording
                 .contacts(record)
                 .iter()
-                .map(|c| candidates[c.candidate as usize])
+                .map(|c| loaded.contact_node(c.candidate))
                 .collect();
             let here = solver.strain_peaks(
                 &u,

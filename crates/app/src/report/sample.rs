@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::data::*;
+use super::strain::{PeakKind, StrainFacts, StrainPeak};
 
 /// Force of the sample over its travel, N: up to 40 N at 2 mm, down to -10 N at 3 mm, 0 at 4 mm.
 pub(super) fn force(travel_m: f64) -> f64 {
@@ -222,6 +223,19 @@ pub(super) fn run() -> Run {
                 words: "the processor, 64 bits, as asked for".into(),
                 ..MultiplyFacts::default()
             },
+        },
+        strain: StrainFacts {
+            peaks: vec![StrainPeak {
+                value: 0.021,
+                error: 0.003,
+                place: [0.0, -9e-3, 0.0],
+                node_tag: 12,
+                travel_m: 1e-3,
+                force_n: 20.0,
+                kind: PeakKind::Free,
+            }],
+            permissible: Some(0.04),
+            n_moments: 40,
         },
         rows: rows(),
         part,

@@ -74,12 +74,12 @@ impl StrainPeak {
 
     /// Node, coordinates in mm, travel in mm and force in N.
     pub fn where_and_when(&self) -> String {
-        let [x, y, z] = self.place.map(|c| short(1e3 * c + 0.0));
+        let [x, y, z] = self.place.map(millimetres);
         format!(
             "node {} at ({x}, {y}, {z}) mm, at {} mm of travel and {} N",
             self.node_tag,
-            short(1e3 * self.travel_m + 0.0),
-            short(self.force_n + 0.0),
+            millimetres(self.travel_m),
+            newtons(self.force_n),
         )
     }
 }
@@ -236,14 +236,28 @@ impl StrainFacts {
                         .filter(|s| s.is_finite())
                         .map_or("not given".to_owned(), short),
                     p.node_tag.to_string(),
-                    p.place.map(|c| short(1e3 * c + 0.0)).join(", "),
-                    short(1e3 * p.travel_m + 0.0),
-                    short(p.force_n + 0.0),
+                    p.place.map(millimetres).join(", "),
+                    millimetres(p.travel_m),
+                    newtons(p.force_n),
                     p.kind.why().to_owned(),
                 ]
             })
             .collect()
     }
+}
+
+/// mm; below a nanometre is round-off.
+fn millimetres(metres: f64) -> String {
+    short(if metres.abs() < 1e-9 {
+        0.0
+    } else {
+        1e3 * metres
+    })
+}
+
+/// N; below a micronewton is round-off.
+fn newtons(force: f64) -> String {
+    short(if force.abs() < 1e-6 { 0.0 } else { force })
 }
 
 /// Headings of [`StrainFacts::table`].
@@ -334,5 +348,72 @@ pub(super) fn summary(facts: &StrainFacts) -> StrainSummary {
         safety_once: facts.safety_once(),
         safety_repeated: facts.safety_repeated(),
         moments: facts.n_moments,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn peak(kind: PeakKind, value: f64) -> StrainPeak {
+        StrainPeak {
+            value,
+            error: 0.1 * value,
+            place: [1e-3, -1e-13, 2.5e-3],
+            node_tag: 17,
+            travel_m: 2e-3,
+            force_n: -1e-12,
+            kind,
+        }
+    }
+
+    fn facts(permissible: Option<f64>) -> StrainFacts {
+        StrainFacts {
+            peaks: vec![peak(PeakKind::AtHeld, 0.05), peak(PeakKind::Free, 0.01)],
+            permissible,
+            n_moments: 40,
+        }
+    }
+
+    #[test]
+    fn safety_is_against_the_free_skin_and_six_tenths_of_it_for_repeated_use() {
+        let facts = facts(Some(0.02));
+        assert_eq!(facts.value(), 0.01);
+        assert_eq!(facts.safety_once(), Some(2.0));
+        assert_eq!(facts.safety_repeated(), Some(1.2));
+        assert_eq!(
+            facts.text(),
+            "  largest strain        1 ± 0.1 %, safety 2 once, 1.2 repeatedly, against 2 %\n                        \
+             node 17 at (1, 0, 2.5) mm, at 2 mm of travel and 0 N\n                        \
+             5 ± 0.5 % at the border of a held region: grows without bound as the mesh is refined\n"
+        );
+        assert!(facts.remarks().is_empty());
+    }
+
+    #[test]
+    fn without_a_permissible_strain_that_is_said() {
+        let text = facts(None).text();
+        assert!(text.contains("no permissible strain given"), "{text}");
+        let value = serde_json::to_value(summary(&facts(None))).unwrap();
+        assert!(value["safety_once"].is_null() && value["permissible"].is_null());
+        assert_eq!(value["at_held"]["value"], 0.05);
+        assert!(value["at_contact"].is_null());
+    }
+
+    #[test]
+    fn beyond_the_permissible_strain_is_told_within_the_bar_too() {
+        assert!(facts(Some(0.009)).remarks()[0].contains("is beyond"));
+        assert!(facts(Some(0.0105)).remarks()[0].contains("may be beyond"));
+    }
+
+    #[test]
+    fn a_part_without_free_skin_has_the_largest_of_all() {
+        let mut facts = facts(Some(0.02));
+        facts.peaks.retain(|p| p.kind == PeakKind::AtHeld);
+        assert_eq!(facts.value(), 0.05);
+        assert!(facts.text().contains("grows without bound"));
+        facts.peaks.clear();
+        assert_eq!(facts.safety_once(), None);
+        assert!(facts.text().contains("nothing was strained"));
     }
 }

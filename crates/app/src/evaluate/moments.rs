@@ -56,7 +56,7 @@ impl Moments {
     pub(super) fn labelled(&self, count: usize, strained: Option<usize>) -> Vec<(String, usize)> {
         let named = [
             (self.peak, "peak"),
-            (strained, "largest strain"),
+            (strained, "most strained"),
             (self.n.checked_sub(1), "home"),
             (self.pull, "pull"),
             (self.touch, "first contact"),

@@ -299,7 +299,7 @@ fn frame<'p>(
     let eigen = spread.symmetric_eigen();
     // Samples of one element of order 2 span space, those of one of order 1 are a point.
     let smallest = eigen.eigenvalues.min();
-    if !(smallest > 1e-12 * eigen.eigenvalues.max()) {
+    if smallest.is_nan() || smallest <= 1e-12 * eigen.eigenvalues.max() {
         return None;
     }
     let axes = std::array::from_fn(|k| {

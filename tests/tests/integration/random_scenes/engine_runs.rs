@@ -117,7 +117,7 @@ fn tool_meshes(folder: &Path) -> Vec<Arc<Mesh>> {
 }
 
 fn tool(random: &mut Random, meshes: &[Arc<Mesh>]) -> Tool {
-    let mut size = || random.decades(2e-4, 0.1);
+    let mut size = || random.decades(2e-4, 0.05);
     let (a, b, c) = (size(), size(), size());
     match random.below(8) {
         0 => Tool::Sphere(Sphere::new(a).unwrap()),
@@ -187,13 +187,20 @@ fn path(random: &mut Random, tool: &Tool, size: DVec3) -> Vec<DPose3> {
     poses
 }
 
-fn settings(random: &mut Random, engine: &Engine, size: DVec3) -> EngineSettings {
-    let plain = engine.settings().clone();
+fn settings(random: &mut Random, tool: &Tool, size: DVec3) -> EngineSettings {
+    let size = size.length().min(tool.characteristic_size());
     EngineSettings {
+        displacement_tolerance: 1e-9,
+        merge_tolerance: 0.05,
+        lcp: contact::lcp::Settings::default(),
+        max_stride: 0.02 * size,
         near_distance: if random.chance(0.5) {
-            plain.near_distance
+            4e-4 * size
+        } else if random.chance(0.9) {
+            random.decades(1e-7, 5e-4)
         } else {
-            random.decades(1e-7, 0.5 * size.length())
+            // Nearly everything is near: each step takes long.
+            random.decades(5e-4, 0.02)
         },
         max_contacts: random.pick(&[1, 2, 3, 7, 30, 500]),
         contact_iterations: random.pick(&[
@@ -202,7 +209,6 @@ fn settings(random: &mut Random, engine: &Engine, size: DVec3) -> EngineSettings
             ContactIterations::Fixed(1),
             ContactIterations::Fixed(3),
         ]),
-        ..plain
     }
 }
 
@@ -211,9 +217,8 @@ fn engine(random: &mut Random, ready: &Ready, tool: &Tool) -> Result<Engine, Str
     let mut scene = ready.scene.clone();
     scene.accuracy.tool_features = random.pick(&[ToolFeatures::Auto, ToolFeatures::Off]);
     scene.coupling.translational_stiffness = random.decades(1e2, 1e7);
-    let engine = setup::engine(&scene, &ready.prepared, tool.clone()).map_err(|e| e.to_string())?;
-    let settings = settings(random, &engine, ready.size);
-    if engine.is_constrained() || random.chance(0.5) {
+    let settings = settings(random, tool, ready.size);
+    if ready.prepared.bubbles.is_some() || random.chance(0.5) {
         scene.accuracy.near_distance = Some(settings.near_distance);
         scene.accuracy.max_contacts = settings.max_contacts;
         scene.accuracy.contact_iterations = match settings.contact_iterations {
@@ -323,7 +328,11 @@ fn random_tools_on_random_ways_never_panic_and_leave_no_node_inside() {
     let mut n_touched = 0;
     let mut n_runs = 0;
     for_each_seed(300, |_, random| {
-        let which = random.below(ready.len());
+        // Constrained parts take long to set up: one in three of them.
+        let mut which = random.below(ready.len());
+        if ready[which].prepared.bubbles.is_some() && random.chance(0.7) {
+            which = random.below(ready.len());
+        }
         let touched = run(random, &ready[which], &meshes)
             .map_err(|why| format!("{}: {why}", ready[which].name))?;
         n_runs += 1;

@@ -1,0 +1,52 @@
+//! Force over travel, and the handbook beside it.
+
+use std::fmt::Write as _;
+
+use super::super::data::{Handbook, Run};
+use super::super::plot::short;
+use super::blocks::{figure, section, table};
+use super::text::escaped;
+
+/// The plot of the force, and what the handbook says.
+pub(super) fn curve(page: &mut String, run: &Run, force_svg: &str) {
+    section(page, "Force over travel");
+    figure(page, force_svg, FORCE_CAPTION);
+    if let Some(handbook) = &run.handbook {
+        section(page, "Beside the handbook");
+        handbook_table(page, handbook);
+    }
+}
+
+const FORCE_CAPTION: &str = "Force that the hand feels against how far the tool has moved. Above zero \
+    the part resists; below zero it pulls the tool in.";
+
+fn handbook_table(page: &mut String, handbook: &Handbook) {
+    let _ = writeln!(page, "<p>{}</p>", escaped(&handbook.name));
+    let rows = handbook.rows.iter().map(|row| {
+        let difference = if row.handbook == 0.0 {
+            String::new()
+        } else {
+            format!("{:+.1} %", 100.0 * (row.computed / row.handbook - 1.0))
+        };
+        let numbers = [short(row.handbook), short(row.computed), difference];
+        (row.label.clone(), numbers.to_vec(), row.unit.clone())
+    });
+    let rows: Vec<Vec<String>> = rows
+        .map(|(label, numbers, unit)| {
+            let mut cells = vec![if unit.is_empty() {
+                label
+            } else {
+                format!("{label} ({unit})")
+            }];
+            cells.extend(numbers);
+            cells
+        })
+        .collect();
+    table(
+        page,
+        &["", "handbook", "computed", "difference"],
+        &rows,
+        &[],
+        false,
+    );
+}

@@ -1,0 +1,103 @@
+//! All numbers of the run.
+
+use super::super::curve::Curve;
+use super::super::data::Run;
+use super::super::plot::short;
+use super::super::strain::StrainPeak;
+use super::super::summary::{max_certificate, max_wrench_mismatch};
+use super::blocks::{labelled, section};
+
+/// The table of key numbers.
+pub(super) fn key_numbers(page: &mut String, run: &Run, curve: &Curve) {
+    section(page, "Key numbers");
+    let facts = &run.facts;
+    let millimetres = |m: f64| format!("{} mm", short(m * 1e3));
+    let newtons = |n: f64| format!("{} N", short(n));
+    let order = match facts.order {
+        1 => "linear".to_owned(),
+        2 => "quadratic".to_owned(),
+        3 => "cubic".to_owned(),
+        n => format!("order {n}"),
+    };
+    let source = if facts.from_cache {
+        " (read from the cache)"
+    } else {
+        ""
+    };
+    let contacts = run.rows.iter().map(|row| row.contacts).max().unwrap_or(0);
+    let rows = [
+        ("peak insertion force", newtons(curve.peak_force_n)),
+        ("travel at the peak", millimetres(curve.travel_at_peak_m)),
+        ("snap drop", newtons(curve.snap_drop_n)),
+        (
+            "snap travel",
+            curve
+                .snap_travel_m
+                .map_or("does not snap".into(), millimetres),
+        ),
+        (
+            "insertion work",
+            format!("{} mJ", short(curve.insertion_work_j * 1e3)),
+        ),
+        (
+            "net work of the whole insertion",
+            format!("{} mJ", short(curve.net_work_j * 1e3)),
+        ),
+        (
+            "retention force",
+            curve
+                .retention_force_n
+                .map_or("not pulled out".into(), newtons),
+        ),
+        (
+            "largest principal strain",
+            run.strain
+                .governing()
+                .map_or("none".into(), StrainPeak::percent),
+        ),
+        (
+            "safety against permissible strain",
+            run.strain.safety_words(),
+        ),
+        (
+            "largest rotation",
+            format!("{}\u{b0}", short(facts.max_rotation_deg)),
+        ),
+        (
+            "coupling stiffness",
+            facts
+                .coupling_stiffness
+                .map_or("none: the tool's pose is imposed".into(), |k| {
+                    format!("{} N/mm", short(k / 1e3))
+                }),
+        ),
+        (
+            "mesh",
+            format!("{} nodes, {} {order} elements", facts.nodes, facts.elements),
+        ),
+        (
+            "surface nodes",
+            format!(
+                "{}, of which {} may touch",
+                facts.surface_nodes, facts.candidates
+            ),
+        ),
+        ("most contacts at once", contacts.to_string()),
+        ("steps", run.rows.len().to_string()),
+        ("missed deadlines", facts.missed_deadlines.to_string()),
+        (
+            "worst certificate",
+            format!("{:.1e}", max_certificate(&run.rows)),
+        ),
+        (
+            "worst imbalance of contact and coupling",
+            format!("{:.1e}", max_wrench_mismatch(&run.rows)),
+        ),
+        (
+            "preparation",
+            format!("{} s{source}", short(facts.prepare_s)),
+        ),
+    ];
+    let rows: Vec<_> = rows.into_iter().map(|(l, v)| (l.to_owned(), v)).collect();
+    labelled(page, &rows);
+}

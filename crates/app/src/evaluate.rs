@@ -11,16 +11,16 @@ use glam::DVec3;
 use crate::Error;
 use crate::between::BetweenNodes;
 use crate::choice::Why;
-use crate::effects::{Observed, Verdict, judge};
+use crate::effects::{Observed, Ramp, Verdict, judge};
 use crate::engine::{Engine, Stage};
 use crate::fields::FieldSolver;
 use crate::machine::Machine;
 use crate::prepare::PreparedPart;
 use crate::report::{
     ContactForce, Effect, Facts, Frame, Handbook, HandbookRow, MultiplyFacts, MultiplyRace,
-    Outputs, PaperStage, Phase, RateFacts, Run, StepRow, TwoRateFacts, View,
+    Outputs, PaperStage, Phase, RateFacts, Run, StepRow, TwoRateFacts, View, Warning,
 };
-use crate::scene::{EffectChoice, Scene, ToolShape};
+use crate::scene::{EffectChoice, Handle, Scene, ToolShape};
 use crate::session::{Record, Recording, part_extent};
 use crate::shape::Shape;
 use moments::Moments;
@@ -33,6 +33,8 @@ pub(crate) struct Story<'a> {
     pub(crate) recording: &'a Recording,
     pub(crate) shape: &'a Shape,
     pub(crate) remarks: Vec<String>,
+    /// What makes the result doubtful.
+    pub(crate) doubts: Vec<Warning>,
     /// What a time budget was made into.
     pub(crate) picked: Option<String>,
 }
@@ -80,11 +82,13 @@ impl Story<'_> {
         warnings.extend(self.shape.choice().warning());
         warnings.extend(self.shape.given_up().map(str::to_owned));
         warnings.extend(verdicts.iter().filter(|v| v.missing).map(|v| {
-            let number = v.number.map(|n| format!("{n:.2}")).unwrap_or_default();
+            let number = v
+                .number
+                .map(|n| format!(" ({n:.2} beyond {:.2})", v.threshold));
             format!(
-                "this scene calls for {}, which this version does not simulate ({number} beyond {:.2}): {}",
+                "this scene calls for {}, which this version does not simulate{}: {}",
                 v.name.replace('_', " "),
-                v.threshold,
+                number.unwrap_or_default(),
                 v.why
             )
         }));
@@ -98,7 +102,11 @@ impl Story<'_> {
             settings: self.settings(),
             checks: self.checks(),
             notes: self.notes(),
-            warnings,
+            warnings: [
+                self.doubts.clone(),
+                warnings.into_iter().map(Warning::from).collect(),
+            ]
+            .concat(),
             facts: Facts {
                 nodes: loaded.mesh.n_nodes(),
                 elements: loaded.mesh.n_elements(),
@@ -215,22 +223,37 @@ impl Story<'_> {
             .fold(0.0, f64::max);
         let feature = drawing::shortest_edge(&self.prepared.loaded.mesh)
             .min(self.engine.tool().characteristic_size());
-        let ramp_angle = moments.peak.and_then(|i| {
-            let normal: f64 = self
-                .recording
-                .contacts(&records[i])
-                .iter()
-                .map(|c| c.normal_force)
-                .sum();
-            let axial = self.recording.resistance(&records[i]).abs();
-            (normal > 0.0).then(|| (axial / normal).clamp(0.0, 1.0).asin())
-        });
+        let (ramp, release, has_passed) = self.ramps(moments);
         Observed {
             max_rotation,
-            ramp_angle,
+            ramp,
+            release,
+            has_passed,
             friction_coefficient: self.scene.effects.friction_coefficient,
             motion_per_feature: fastest / feature,
         }
+    }
+
+    /// What the body slides on at the peak, what it comes back over, and whether it went past the peak.
+    fn ramps(&self, moments: &Moments) -> (Ramp, Option<Ramp>, bool) {
+        let records = &self.recording.records;
+        // Contacts are in the part's frame, where a held part stands still and the tool comes.
+        let way = match self.scene.handle {
+            Handle::Tool => self.recording.direction,
+            Handle::Part => -self.recording.direction,
+        };
+        let at = |i: usize| Ramp::of(self.recording.contacts(&records[i]), way);
+        let force = |i: usize| self.recording.resistance(&records[i]);
+        let Some(peak) = moments.peak else {
+            return (Ramp::default(), None, false);
+        };
+        let has_passed = moments.crest.is_some();
+        // The hardest pull towards home, on the way in or out: that is the flank of the way out.
+        let release = (peak..records.len())
+            .min_by(|&a, &b| force(a).total_cmp(&force(b)))
+            .filter(|&i| force(i) < 0.0)
+            .map(|i| at(i).reversed());
+        (at(peak), release, has_passed)
     }
 
     fn handbook(&self, rows: &[StepRow], strain: f64) -> Option<Handbook> {

@@ -22,6 +22,7 @@ pub mod interrupt;
 mod leftovers;
 pub mod machine;
 mod output;
+mod plausibility;
 pub mod prepare;
 pub mod progress;
 pub mod report;

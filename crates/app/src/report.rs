@@ -26,7 +26,7 @@ pub use curve::Curve;
 pub use data::{
     CellKind, ContactForce, Effect, Facts, Frame, Handbook, HandbookRow, MultiplyFacts,
     MultiplyRace, N_STAGES, Outputs, PaperStage, PartDrawing, Phase, RateFacts, Run, STAGE_NAMES,
-    StepRow, TwoRateFacts, View,
+    StepRow, TwoRateFacts, View, Warning,
 };
 pub use error::ReportError;
 pub use strain::{PeakKind, StrainFacts, StrainPeak};

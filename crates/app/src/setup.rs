@@ -212,7 +212,7 @@ pub fn engine(scene: &Scene, prepared: &PreparedPart, tool: Tool) -> Result<Engi
             scene::ContactIterations::Converged => ContactIterations::Converged,
             scene::ContactIterations::Times(n) => ContactIterations::Fixed(n),
         },
-        displacement_tolerance: DISPLACEMENT_TOLERANCE,
+        displacement_tolerance: DISPLACEMENT_TOLERANCE.min(TOLERANCE_SHARE * extent),
         near_distance: scene.accuracy.near_distance.unwrap_or(NEAR_SHARE * size),
         max_contacts: scene.accuracy.max_contacts,
         merge_tolerance: scene.accuracy.merge_tolerance,
@@ -333,6 +333,8 @@ fn lcp_settings(scene: &Scene) -> lcp::Settings {
 
 /// m. A nanometre on a part of 10 kN/m is a hundred-thousandth of a newton.
 const DISPLACEMENT_TOLERANCE: f64 = 1e-9;
+/// Of the part's diagonal: what a nanometre is on 10 mm. On a smaller part it would show.
+const TOLERANCE_SHARE: f64 = 1e-7;
 
 /// Share of the tool's size within which a node gets a plane: 4 um on a tube of 20 mm. A node that
 /// comes in from farther away gets its plane one pass later; fewer rows save more than that costs.

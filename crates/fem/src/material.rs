@@ -27,7 +27,7 @@ impl Material {
             return Err(Error::Material {
                 name: "poisson_ratio",
                 value: poisson_ratio,
-                rule: "must be above -1 and below 0.5; for rubber-like parts use 0.499 with order = 2",
+                rule: "must be above -1 and below 0.5; for rubber-like parts use 0.49 with order = 3",
             });
         }
         Ok(Self {

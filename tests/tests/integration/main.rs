@@ -11,6 +11,7 @@ mod docs;
 mod fast_path;
 mod multiply;
 mod p_method;
+mod plausibility;
 mod random_scenes;
 mod scenes;
 mod shape_on_gpu;

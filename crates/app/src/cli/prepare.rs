@@ -7,13 +7,13 @@ use clap::Args;
 use serde_json::json;
 
 use super::{CacheArgs, json_text, print};
-use crate::Error;
+use crate::plausibility;
 use crate::prepare::budget::{bytes, duration};
 use crate::prepare::{PreparedPart, prepare};
 use crate::progress::Ui;
 use crate::scene::Scene;
-use crate::setup;
 use crate::study::accuracy::resolved;
+use crate::{Error, setup};
 
 #[derive(Debug, Args)]
 pub(super) struct PrepareArgs {
@@ -35,6 +35,7 @@ pub(super) fn run(args: &PrepareArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Resul
     let (scene, picked) = resolved(scene, &options, ui)?;
     picked.iter().for_each(|line| ui.note(line));
     let prepared = prepare(&setup::part_spec(&scene)?, &options, ui)?;
+    plausibility::tell(&plausibility::of_part(&scene, &prepared.loaded), ui);
     print(
         out,
         &if args.json {

@@ -15,7 +15,7 @@ use crate::report::{Curve, RateFacts, Run, summary, write_all};
 use crate::scene::Scene;
 use crate::shape::Shape;
 use crate::study::accuracy::resolved;
-use crate::{Error, session, setup};
+use crate::{Error, plausibility, session, setup};
 
 #[derive(Debug, Args)]
 pub(super) struct RunArgs {
@@ -49,6 +49,8 @@ pub(super) fn run(args: &RunArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u8
     let (tool, remarks) = setup::tool(&scene)?;
     picked.iter().for_each(|line| ui.note(line));
     let prepared = prepare(&setup::part_spec(&scene)?, &options, ui)?;
+    let mut doubts = plausibility::before(&scene, &prepared, &tool);
+    let n_told = plausibility::tell(&doubts, ui);
     let mut engine = setup::engine(&scene, &prepared, tool)?;
     let mut spec = setup::session(&scene);
     spec.real_time |= args.real_time;
@@ -58,6 +60,9 @@ pub(super) fn run(args: &RunArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u8
     if spec.real_time || recording.two_rates.is_some() {
         ui.note(&recording.rates.words());
     }
+    doubts.extend(plausibility::after(
+        &scene, &prepared, &engine, &recording, &options,
+    )?);
     let story = Story {
         scene: &scene,
         prepared: &prepared,
@@ -65,12 +70,13 @@ pub(super) fn run(args: &RunArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u8
         recording: &recording,
         shape: &shape,
         remarks,
+        doubts,
         picked,
     };
     let run = story.tell(&progress)?;
     drop(progress);
-    for warning in &run.warnings {
-        ui.note(&format!("warning: {warning}"));
+    for warning in &run.warnings[n_told..] {
+        ui.note(&format!("warning: {}", warning.text));
     }
     write_all(staging.path(), &run)?;
     if crate::interrupt::is_requested() {

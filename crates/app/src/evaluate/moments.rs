@@ -10,7 +10,7 @@ pub(super) struct Moments {
     n: usize,
     touch: Option<usize>,
     pub(super) peak: Option<usize>,
-    crest: Option<usize>,
+    pub(super) crest: Option<usize>,
     pull: Option<usize>,
 }
 

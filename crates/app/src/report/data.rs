@@ -36,8 +36,8 @@ pub struct Run {
     pub checks: Vec<(String, String)>,
     /// Sentences for the reader.
     pub notes: Vec<String>,
-    /// Sentences that the reader must not miss.
-    pub warnings: Vec<String>,
+    /// What the reader must not miss.
+    pub warnings: Vec<Warning>,
     /// Numbers about the part and the run as a whole.
     pub facts: Facts,
     /// The largest strains, and what the material bears.
@@ -58,6 +58,28 @@ pub struct Run {
     pub view: View,
     /// Which of the larger files are written.
     pub outputs: Outputs,
+}
+
+/// What the reader must not miss: one doubt about a run, with its number and the mend.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Warning {
+    /// Kind of doubt, in words joined by hyphens, for programs.
+    pub id: &'static str,
+    /// One sentence: what was seen, with its number and unit, and what to do.
+    pub text: String,
+    /// The number that gave rise to it, in the SI unit that the text names or without unit.
+    pub number: Option<f64>,
+}
+
+impl From<String> for Warning {
+    /// A doubt of no kind of its own.
+    fn from(text: String) -> Self {
+        Self {
+            id: "run",
+            text,
+            number: None,
+        }
+    }
 }
 
 /// Numbers about the part and the run as a whole.

@@ -191,7 +191,11 @@ pub(super) fn run() -> Run {
         settings: vec![("coupling".into(), "10 N/mm".into())],
         checks: vec![("symmetry of the compliance".into(), "3.1e-16".into())],
         notes: vec!["made up for a test".into()],
-        warnings: vec!["friction would change the force by \"30 %\"".into()],
+        warnings: vec![
+            "friction would change the force by \"30 %\""
+                .to_owned()
+                .into(),
+        ],
         facts: Facts {
             nodes: part.nodes.len(),
             elements: part.cells.len() / 4,

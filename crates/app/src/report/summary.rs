@@ -99,6 +99,26 @@ struct Summary<'a> {
     rates: RatesSummary<'a>,
     multiply: MultiplySummary<'a>,
     effects: BTreeMap<&'a str, EffectSummary<'a>>,
+    warnings: Vec<WarningSummary<'a>>,
+}
+
+#[derive(Serialize)]
+struct WarningSummary<'a> {
+    id: &'a str,
+    text: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    number: Option<f64>,
+}
+
+fn warnings_summary(run: &Run) -> Vec<WarningSummary<'_>> {
+    run.warnings
+        .iter()
+        .map(|warning| WarningSummary {
+            id: warning.id,
+            text: &warning.text,
+            number: warning.number,
+        })
+        .collect()
 }
 
 #[derive(Serialize)]
@@ -239,6 +259,7 @@ pub fn json(run: &Run, curve: &Curve) -> String {
                 )
             })
             .collect(),
+        warnings: warnings_summary(run),
     };
     // Plain numbers, strings and maps with string keys: there is nothing to refuse.
     let mut text = serde_json::to_string_pretty(&summary).unwrap_or_default();
@@ -347,6 +368,7 @@ mod tests {
             "prepare_s",
             "rates",
             "effects",
+            "warnings",
         ] {
             assert!(!value[key].is_null(), "{key}");
         }

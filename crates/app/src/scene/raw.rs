@@ -182,7 +182,7 @@ pub(super) struct MaterialRaw {
     /// Young's modulus, above 0.
     #[schemars(extend("x-quantity" = "pressure"))]
     pub(super) young_modulus: At<f64>,
-    /// Poisson's ratio, above -1 and below 0.5; 0.499 for rubber-like parts.
+    /// Poisson's ratio, above -1 and below 0.5; for rubber-like parts 0.49 with order = 3 (elements lock nearer to 0.5 and at lower order).
     #[schemars(extend("x-quantity" = "number"))]
     pub(super) poisson_ratio: At<f64>,
     /// Density, above 0; needed for the size of gravity and of the part's inertia.

@@ -245,7 +245,7 @@ fn refusals_name_line_key_and_mend() {
     let cases = [
         (
             with(nu, "poisson_ratio = 0.5"),
-            "clip.toml:10: poisson_ratio 0.5 must be below 0.5; for rubber-like parts use 0.499 with order = 2",
+            "clip.toml:10: poisson_ratio 0.5 must be below 0.5; for rubber-like parts use 0.49 with order = 3",
         ),
         (
             with(nu, "poisson_ratio = -1"),

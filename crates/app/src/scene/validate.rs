@@ -267,7 +267,8 @@ impl Check<'_> {
             return Err(self.error(
                 nu.offset,
                 what,
-                "for rubber-like parts use 0.499 with order = 2",
+                "for rubber-like parts use 0.49 with order = 3 (nearer to 0.5, or at order 2, elements lock: \
+                 forces are far too high)",
             ));
         }
         if poisson_ratio <= -1.0 {

@@ -33,7 +33,7 @@ use crate::prepare::{PrepareOptions, budget::Forecast, load};
 use crate::progress::Ui;
 use crate::scene::{Accuracy, Handle, Multiply, Preset, Scene};
 use crate::session::part_extent;
-use crate::{Error, interrupt, setup};
+use crate::{Error, interrupt, plausibility, setup};
 use compare::{Scales, distance, errors};
 use measure::{Course, Samples};
 use store::Store;
@@ -169,6 +169,7 @@ pub fn run(
     };
     let own = runner.base(scene);
     let loaded = load(&setup::part_spec(scene)?)?;
+    plausibility::tell(&plausibility::of_part(scene, &loaded), ui);
     let scales = Scales {
         direction: match scene.handle {
             Handle::Tool => scene.hand.direction,

@@ -8,6 +8,6 @@ use super::text::escaped;
 /// A line for each warning.
 pub(super) fn warnings(page: &mut String, run: &Run) {
     for warning in &run.warnings {
-        let _ = writeln!(page, "<p class=\"warning\">{}</p>", escaped(warning));
+        let _ = writeln!(page, "<p class=\"warning\">{}</p>", escaped(&warning.text));
     }
 }

@@ -17,7 +17,7 @@ use crate::fields::FieldSolver;
 use crate::machine::Machine;
 use crate::prepare::PreparedPart;
 use crate::report::{
-    ContactForce, Effect, Facts, Frame, Handbook, HandbookRow, MultiplyFacts, MultiplyRace,
+    ContactForce, Effect, Facts, Frame, Handbook, HandbookRow, MultiplyFacts, MultiplyRace, Origin,
     Outputs, PaperStage, Phase, RateFacts, Run, StepRow, TwoRateFacts, View, Warning,
 };
 use crate::scene::{EffectChoice, Handle, Scene, ToolShape};
@@ -35,6 +35,9 @@ pub(crate) struct Story<'a> {
     pub(crate) remarks: Vec<String>,
     /// What makes the result doubtful.
     pub(crate) doubts: Vec<Warning>,
+    pub(crate) origin: Origin,
+    /// Whether the steps had to keep up with a clock.
+    pub(crate) is_real_time: bool,
     /// What a time budget was made into.
     pub(crate) picked: Option<String>,
 }
@@ -99,6 +102,7 @@ impl Story<'_> {
             title: scene.title.clone(),
             scene_path: scene.path.display().to_string(),
             machine: Machine::read().summary(),
+            origin: self.origin.clone(),
             settings: self.settings(),
             checks: self.checks(),
             notes: self.notes(),
@@ -116,7 +120,9 @@ impl Story<'_> {
                 coupling_stiffness: Some(scene.coupling.translational_stiffness),
                 prepare_s: prepared.total_seconds(),
                 from_cache: prepared.from_cache,
-                missed_deadlines: recording.servo.missed_deadlines,
+                missed_deadlines: self
+                    .is_real_time
+                    .then_some(recording.servo.missed_deadlines),
                 max_principal_strain: strained.facts.value(),
                 max_rotation_deg: max_rotation.to_degrees(),
                 rates: rate_facts(recording),

@@ -21,6 +21,7 @@ mod free_nodes;
 pub mod interrupt;
 mod leftovers;
 pub mod machine;
+mod origin;
 mod output;
 mod plausibility;
 pub mod prepare;

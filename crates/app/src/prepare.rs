@@ -140,7 +140,7 @@ pub struct LoadedPart {
     pub rows: Vec<u32>,
     /// Lines about the mesh that the user should see.
     pub warnings: Vec<String>,
-    mesh_hash: [u8; 32],
+    pub(crate) mesh_hash: [u8; 32],
 }
 
 impl LoadedPart {

@@ -9,6 +9,7 @@ pub mod data;
 mod error;
 pub mod html;
 pub mod mcap_file;
+pub mod origin;
 pub mod plot;
 pub mod render;
 pub mod strain;
@@ -16,6 +17,7 @@ pub mod summary;
 pub mod vtu;
 pub mod work_precision;
 
+mod digits;
 mod font;
 #[cfg(test)]
 mod sample;
@@ -29,6 +31,7 @@ pub use data::{
     StepRow, TwoRateFacts, View, Warning,
 };
 pub use error::ReportError;
+pub use origin::{InputFile, Origin};
 pub use strain::{PeakKind, StrainFacts, StrainPeak};
 
 /// Writes the whole result folder of `run` into the existing directory `dir`.
@@ -59,12 +62,15 @@ pub fn write_all(dir: &Path, run: &Run) -> Result<Vec<PathBuf>, ReportError> {
     write_file(&mut written, &dir.join("summary.json"), summary.as_bytes())?;
 
     let force_path = dir.join("force-travel.svg");
-    let force_svg =
-        plot::force_travel(run, &curve).map_err(|e| ReportError::plot(&force_path, e))?;
-    write_file(&mut written, &force_path, force_svg.as_bytes())?;
+    let series = plot::force::felt(run);
+    let mark = plot::force::peak(&curve);
+    let force_svg = plot_formats(&force_path, |format| {
+        plot::force_travel(&series, mark.as_ref(), format)
+    })?;
+    write_file(&mut written, &force_path, force_svg.wide.as_bytes())?;
     let time_path = dir.join("step-time.svg");
-    let time_svg = plot::step_time(&run.rows).map_err(|e| ReportError::plot(&time_path, e))?;
-    write_file(&mut written, &time_path, time_svg.as_bytes())?;
+    let time_svg = plot_formats(&time_path, |format| plot::step_time(&run.rows, format))?;
+    write_file(&mut written, &time_path, time_svg.wide.as_bytes())?;
 
     let frames_dir = dir.join("frames");
     if !run.frames.is_empty() && (run.outputs.png || run.outputs.vtu) {
@@ -104,6 +110,18 @@ pub fn write_all(dir: &Path, run: &Run) -> Result<Vec<PathBuf>, ReportError> {
     Ok(written)
 }
 
+/// A plot in all its formats; `path` is that of the wide one, for errors.
+fn plot_formats(
+    path: &Path,
+    draw: impl Fn(plot::Format) -> Result<String, Box<dyn std::error::Error>>,
+) -> Result<html::Plot, ReportError> {
+    let draw = |format| draw(format).map_err(|e| ReportError::plot(path, e));
+    Ok(html::Plot {
+        wide: draw(plot::Format::Wide)?,
+        narrow: draw(plot::Format::Narrow)?,
+    })
+}
+
 /// Name of a frame's files without their ending: its number, then its label in plain letters.
 pub fn frame_stem(idx: usize, frame: &Frame) -> String {
     let mut stem = format!("{:02}", idx + 1);
@@ -137,6 +155,7 @@ fn write_pictures(
             pictures.push(html::Picture {
                 frame: idx,
                 quantity,
+                file: format!("frames/{name}"),
                 png,
             });
             Ok(())

@@ -51,6 +51,7 @@ pub(super) fn run(args: &RunArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u8
     let prepared = prepare(&setup::part_spec(&scene)?, &options, ui)?;
     let mut doubts = plausibility::before(&scene, &prepared, &tool);
     let n_told = plausibility::tell(&doubts, ui);
+    let origin = crate::origin::read(&scene, Some(prepared.loaded.mesh_hash))?;
     let mut engine = setup::engine(&scene, &prepared, tool)?;
     let mut spec = setup::session(&scene);
     spec.real_time |= args.real_time;
@@ -71,6 +72,8 @@ pub(super) fn run(args: &RunArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u8
         shape: &shape,
         remarks,
         doubts,
+        origin,
+        is_real_time: spec.real_time,
         picked,
     };
     let run = story.tell(&progress)?;

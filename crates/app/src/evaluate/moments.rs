@@ -12,6 +12,12 @@ pub(super) struct Moments {
     pub(super) peak: Option<usize>,
     pub(super) crest: Option<usize>,
     pull: Option<usize>,
+    /// Last of insertion and hold.
+    home: Option<usize>,
+    /// Strongest pull on the way out.
+    removal: Option<usize>,
+    /// Last of the way out.
+    out: Option<usize>,
 }
 
 impl Moments {
@@ -26,19 +32,30 @@ impl Moments {
         let peak = touch.and_then(|_| (0..end).max_by(|&a, &b| force[a].total_cmp(&force[b])));
         let crest = peak.and_then(|p| (p..end).find(|&i| force[i] <= 0.0));
         let pull = crest.and_then(|c| (c..end).min_by(|&a, &b| force[a].total_cmp(&force[b])));
+        let way_out = end..records.len();
         Self {
             n: records.len(),
             touch,
             peak,
             crest,
             pull,
+            home: end.checked_sub(1),
+            removal: way_out
+                .clone()
+                .min_by(|&a, &b| force[a].total_cmp(&force[b]))
+                .filter(|&i| force[i] < 0.0),
+            out: way_out.last(),
         }
     }
 
     pub(super) fn sampled(&self) -> Vec<usize> {
         let mut all: Vec<usize> = self
             .between(SAMPLED_STEPS)
-            .chain([self.peak, self.crest, self.pull].into_iter().flatten())
+            .chain(
+                [self.peak, self.crest, self.pull, self.removal]
+                    .into_iter()
+                    .flatten(),
+            )
             .collect();
         all.sort_unstable();
         all.dedup();
@@ -57,7 +74,9 @@ impl Moments {
         let named = [
             (self.peak, "peak"),
             (strained, "most strained"),
-            (self.n.checked_sub(1), "home"),
+            (self.home, "home"),
+            (self.removal, "removal"),
+            (self.out, "out"),
             (self.pull, "pull"),
             (self.touch, "first contact"),
             (self.crest, "crest"),

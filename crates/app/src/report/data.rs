@@ -5,6 +5,7 @@
 
 use glam::DVec3;
 
+use super::origin::Origin;
 use super::strain::StrainFacts;
 use super::summary::Percentiles;
 
@@ -30,6 +31,8 @@ pub struct Run {
     pub scene_path: String,
     /// Processor, cores, system: one line.
     pub machine: String,
+    /// When the run was made, and from what.
+    pub origin: Origin,
     /// Settings worth repeating beside the result, as (label, value with unit).
     pub settings: Vec<(String, String)>,
     /// Checks that were made, as (label, value), for example of the compliance matrix.
@@ -102,8 +105,8 @@ pub struct Facts {
     pub prepare_s: f64,
     /// Whether the preparation was read from the cache.
     pub from_cache: bool,
-    /// Steps that ended after their servo period.
-    pub missed_deadlines: u64,
+    /// Steps that ended after their servo period; `None` where no clock was kept.
+    pub missed_deadlines: Option<u64>,
     /// Largest principal strain of the free skin, 1 (0.01 is 1 %); [`StrainFacts::value`].
     pub max_principal_strain: f64,
     /// Largest rotation of a material point, degrees.

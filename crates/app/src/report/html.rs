@@ -21,18 +21,26 @@ use std::fmt::Write as _;
 
 pub use self::headline::headline;
 pub use self::pictures::Picture;
-pub(crate) use self::style::STYLE;
 pub(crate) use self::text::escaped;
 use super::curve::Curve;
 use super::data::Run;
 
+/// A plot for wide and for narrow screens; the page shows the one that fits.
+#[derive(Clone, Debug, Default)]
+pub struct Plot {
+    /// SVG for pages and paper.
+    pub wide: String,
+    /// SVG for phones.
+    pub narrow: String,
+}
+
 /// Plots and pictures that go into the page.
 #[derive(Clone, Debug, Default)]
 pub struct Drawings {
-    /// Force over travel, SVG.
-    pub force_svg: String,
-    /// Time of the stages, SVG.
-    pub time_svg: String,
+    /// Force over travel.
+    pub force_svg: Plot,
+    /// Time of the stages.
+    pub time_svg: Plot,
     /// Pictures in the order in which they are shown.
     pub pictures: Vec<Picture>,
 }
@@ -40,7 +48,13 @@ pub struct Drawings {
 /// The text of `report.html`.
 pub fn page(run: &Run, curve: &Curve, drawings: &Drawings) -> String {
     let mut page = String::new();
-    head::open(&mut page, &run.title, "snap-fit report", &run.scene_path);
+    head::open(
+        &mut page,
+        &run.title,
+        "snap-fit report",
+        &run.scene_path,
+        &run.origin,
+    );
     let _ = writeln!(
         page,
         "<p class=\"headline\">{}</p>",
@@ -70,17 +84,90 @@ mod tests {
 
     fn sample_page() -> String {
         let run = sample::run();
+        page_of(&run)
+    }
+
+    fn page_of(run: &Run) -> String {
         let curve = Curve::of(&run.rows);
+        let [wide, narrow] = [plot::Format::Wide, plot::Format::Narrow].map(|format| {
+            let mark = plot::force::peak(&curve);
+            plot::force_travel(&plot::force::felt(run), mark.as_ref(), format).unwrap()
+        });
         let drawings = Drawings {
-            force_svg: plot::force_travel(&run, &curve).unwrap(),
-            time_svg: plot::step_time(&run.rows).unwrap(),
+            force_svg: Plot { wide, narrow },
+            time_svg: Plot {
+                wide: plot::step_time(&run.rows, plot::Format::Wide).unwrap(),
+                narrow: plot::step_time(&run.rows, plot::Format::Narrow).unwrap(),
+            },
             pictures: vec![Picture {
                 frame: 1,
                 quantity: Quantity::VonMises,
+                file: "frames/02-peak-stress.png".into(),
                 png: b"foobar".to_vec(),
             }],
         };
-        page(&run, &curve, &drawings)
+        page(run, &curve, &drawings)
+    }
+
+    #[test]
+    fn every_table_scrolls_by_itself_and_every_picture_is_a_link_to_its_file() {
+        let page = sample_page();
+        let tables = page.matches("<table>").count();
+        assert!(tables >= 3, "{tables}");
+        assert_eq!(
+            page.matches("<div class=\"scroll\"><table>").count(),
+            tables
+        );
+        let pictures = page.matches("<img ").count();
+        assert_eq!(pictures, 1);
+        assert!(page.contains("<a href=\"frames/02-peak-stress.png\" title=\"full size\"><img "));
+        // Each plot in both formats, scaled by its view box.
+        assert_eq!(page.matches("<figure class=\"plot\">").count(), 2);
+        assert_eq!(page.matches("<svg ").count(), 4);
+        assert_eq!(page.matches("viewBox=").count(), 4);
+    }
+
+    #[test]
+    fn the_page_tells_when_and_from_what_it_was_made() {
+        let run = sample::run();
+        let page = page_of(&run);
+        let hash = run.origin.hash();
+        assert_eq!(hash.len(), 64);
+        for text in [
+            "<time datetime=\"2026-11-27T08:15:30Z\">2026-11-27 08:15 UTC</time>",
+            &format!("input {}<", &hash[..16]),
+            &format!(
+                "<dt>mesh file</dt><dd>clip.msh, BLAKE3 {}</dd>",
+                "cd".repeat(32)
+            ),
+        ] {
+            assert!(page.contains(text), "{text}");
+        }
+        let mut other = run;
+        other.origin.inputs[1].hash[31] ^= 1;
+        assert_ne!(other.origin.hash(), hash);
+        other.origin = super::super::Origin::default();
+        assert!(!page_of(&other).contains("<time"));
+    }
+
+    #[test]
+    fn deadlines_are_told_where_a_clock_was_kept() {
+        let mut run = sample::run();
+        assert!(!page_of(&run).contains("missed deadlines"));
+        run.facts.missed_deadlines = Some(3);
+        assert!(page_of(&run).contains("<dt>missed deadlines</dt><dd>3</dd>"));
+    }
+
+    /// A frame at rest at the end of a run of 40 N: what is left of its force is round-off.
+    #[test]
+    fn captions_are_rounded_beside_what_the_run_reaches() {
+        let mut run = sample::run();
+        run.frames[1].force_n = -3.1e-12;
+        run.frames[1].travel_m = -1.84e-10;
+        let page = page_of(&run);
+        assert!(page.contains("<figcaption>Peak!: von Mises stress, 0 mm of travel, 0 N<"));
+        assert!(!page.contains(">-0"));
+        assert!(!page.contains(" -0 "));
     }
 
     #[test]
@@ -129,8 +216,9 @@ mod tests {
         let mut run = sample::run();
         let evil = "</text><script>alert(1)</script>";
         run.handbook.as_mut().unwrap().name = evil.into();
-        let svg = plot::force_travel(&run, &Curve::of(&run.rows)).unwrap();
-        assert!(!svg.contains("<script"));
+        run.origin.made = evil.into();
+        run.origin.inputs[0].name = evil.into();
+        assert!(!page_of(&run).contains("<script"));
     }
 
     #[test]

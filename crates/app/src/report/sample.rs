@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::data::*;
+use super::origin::{InputFile, Origin};
 use super::strain::{PeakKind, StrainFacts, StrainPeak};
 
 /// Force of the sample over its travel, N: up to 40 N at 2 mm, down to -10 N at 3 mm, 0 at 4 mm.
@@ -188,6 +189,21 @@ pub(super) fn run() -> Run {
         title: "Pipe clip <C-20> & co".into(),
         scene_path: "examples/clip.toml".into(),
         machine: "test machine, 1 core".into(),
+        origin: Origin {
+            made: "2026-11-27T08:15:30Z".into(),
+            inputs: vec![
+                InputFile {
+                    kind: "scene",
+                    name: "clip.toml".into(),
+                    hash: [0xab; 32],
+                },
+                InputFile {
+                    kind: "mesh",
+                    name: "clip.msh".into(),
+                    hash: [0xcd; 32],
+                },
+            ],
+        },
         settings: vec![("coupling".into(), "10 N/mm".into())],
         checks: vec![("symmetry of the compliance".into(), "3.1e-16".into())],
         notes: vec!["made up for a test".into()],
@@ -205,7 +221,7 @@ pub(super) fn run() -> Run {
             coupling_stiffness: Some(1e4),
             prepare_s: 1.25,
             from_cache: false,
-            missed_deadlines: 0,
+            missed_deadlines: None,
             max_principal_strain: 0.021,
             max_rotation_deg: 7.5,
             rates: RateFacts {

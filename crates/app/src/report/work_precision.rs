@@ -5,8 +5,8 @@ use std::error::Error;
 use plotters::prelude::*;
 
 use super::plot::{
-    BLUE, FINE, GREEN, GREY, GRID, INK, Key, ORANGE, PURPLE, SIZE, SKY, VERMILLION, draw, empty,
-    short, stroke, words,
+    BLUE, FINE, Format, GREEN, GREY, GRID, INK, Key, ORANGE, PURPLE, SIZE, SKY, VERMILLION, draw,
+    empty, short, stroke, words,
 };
 
 /// A setting of the study in a plot.
@@ -77,7 +77,7 @@ pub fn error_over_cost(
     let errors = || points.iter().map(|p| p.error).chain([0.05, 0.1]);
     let y0 = 0.6 * errors().fold(f64::INFINITY, f64::min);
     let y1 = 1.8 * errors().fold(0.0, f64::max);
-    draw(&keys, |root| {
+    draw(Format::Wide, &keys, |root| {
         if points.is_empty() {
             return empty(root);
         }
@@ -194,7 +194,7 @@ pub fn force_curves(curves: &[(String, Vec<(f64, f64)>)]) -> Result<String, Box<
     let y0 = all().map(|p| p.1).fold(0.0, f64::min);
     let y1 = all().map(|p| p.1).fold(y0 + 1e-9, f64::max);
     let room = 0.08 * (y1 - y0);
-    draw(&keys, |root| {
+    draw(Format::Wide, &keys, |root| {
         if curves.is_empty() {
             return empty(root);
         }

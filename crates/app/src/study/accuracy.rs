@@ -31,6 +31,7 @@ use crate::choice::name_of;
 use crate::machine::Machine;
 use crate::prepare::{PrepareOptions, budget::Forecast, load};
 use crate::progress::Ui;
+use crate::report::Origin;
 use crate::scene::{Accuracy, Handle, Multiply, Preset, Scene};
 use crate::session::part_extent;
 use crate::{Error, interrupt, plausibility, setup};
@@ -89,6 +90,8 @@ pub struct Study {
     pub own: String,
     /// Where it ran.
     pub machine: String,
+    /// When it ended, and from what.
+    pub origin: Origin,
     /// By axis.
     pub rows: Vec<Row>,
     /// What was compared with.
@@ -244,6 +247,7 @@ pub fn run(
         scene_path: scene.path.display().to_string(),
         own: scene.accuracy.words(),
         machine: machine.summary(),
+        origin: crate::origin::read(scene, None)?,
         peak: (
             peak.force,
             scales.travel_at(peak.at, reference.wrench.len()),

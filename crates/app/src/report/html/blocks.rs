@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::Plot;
 use super::text::escaped;
 
 /// The heading of a section.
@@ -10,10 +11,12 @@ pub(super) fn section(page: &mut String, title: &str) {
 }
 
 /// A drawing with its caption.
-pub(super) fn figure(page: &mut String, svg: &str, caption: &str) {
+pub(super) fn figure(page: &mut String, plot: &Plot, caption: &str) {
+    let Plot { wide, narrow } = plot;
     let _ = writeln!(
         page,
-        "<figure>{svg}<figcaption>{}</figcaption></figure>",
+        "<figure class=\"plot\"><div class=\"wide\">{wide}</div><div class=\"narrow\">{narrow}</div>\
+         <figcaption>{}</figcaption></figure>",
         escaped(caption)
     );
 }
@@ -28,8 +31,13 @@ pub(super) fn table(
     has_prose: bool,
 ) {
     let class = |column: usize| {
-        let is_text = column == 0 || (has_prose && (column == 1 || column + 1 == head.len()));
-        if is_text { "" } else { " class=\"n\"" }
+        let is_last = column + 1 == head.len();
+        match has_prose {
+            _ if column == 0 => "",
+            true if is_last => " class=\"prose\"",
+            true if column == 1 => " class=\"tight\"",
+            _ => " class=\"n\"",
+        }
     };
     page.push_str("<div class=\"scroll\"><table><thead><tr>");
     for (column, cell) in head.iter().enumerate() {

@@ -4,11 +4,12 @@ use std::fmt::Write as _;
 
 use super::super::data::{Handbook, Run};
 use super::super::plot::short;
+use super::Plot;
 use super::blocks::{figure, section, table};
 use super::text::escaped;
 
 /// The plot of the force, and what the handbook says.
-pub(super) fn curve(page: &mut String, run: &Run, force_svg: &str) {
+pub(super) fn curve(page: &mut String, run: &Run, force_svg: &Plot) {
     section(page, "Force over travel");
     figure(page, force_svg, FORCE_CAPTION);
     if let Some(handbook) = &run.handbook {

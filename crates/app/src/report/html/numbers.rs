@@ -84,7 +84,6 @@ pub(super) fn key_numbers(page: &mut String, run: &Run, curve: &Curve) {
         ),
         ("most contacts at once", contacts.to_string()),
         ("steps", run.rows.len().to_string()),
-        ("missed deadlines", facts.missed_deadlines.to_string()),
         (
             "worst certificate",
             format!("{:.1e}", max_certificate(&run.rows)),
@@ -98,6 +97,10 @@ pub(super) fn key_numbers(page: &mut String, run: &Run, curve: &Curve) {
             format!("{} s{source}", short(facts.prepare_s)),
         ),
     ];
-    let rows: Vec<_> = rows.into_iter().map(|(l, v)| (l.to_owned(), v)).collect();
+    let mut rows: Vec<_> = rows.into_iter().map(|(l, v)| (l.to_owned(), v)).collect();
+    // Where no clock was kept, no step can be late.
+    if let Some(missed) = facts.missed_deadlines {
+        rows.push(("missed deadlines".to_owned(), missed.to_string()));
+    }
     labelled(page, &rows);
 }

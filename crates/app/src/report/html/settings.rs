@@ -9,7 +9,12 @@ use super::text::escaped;
 /// What the run was made with, and what was checked.
 pub(super) fn settings(page: &mut String, run: &Run) {
     section(page, "Settings and checks");
-    labelled(page, &run.settings);
+    let mut rows = run.settings.clone();
+    rows.extend(run.origin.inputs.iter().map(|input| {
+        let label = format!("{} file", input.kind);
+        (label, format!("{}, BLAKE3 {}", input.name, input.hex()))
+    }));
+    labelled(page, &rows);
     if !run.checks.is_empty() {
         labelled(page, &run.checks);
     }

@@ -3,10 +3,11 @@
 use super::super::data::{PaperStage, Run};
 use super::super::plot::short;
 use super::super::summary::{Percentiles, stage_percentiles};
+use super::Plot;
 use super::blocks::{figure, section, table};
 
 /// Time by stage, and beside the method's first publication.
-pub(super) fn timing(page: &mut String, run: &Run, svg: &str) {
+pub(super) fn timing(page: &mut String, run: &Run, svg: &Plot) {
     section(page, "Time of a step");
     let stages = stage_percentiles(&run.rows);
     let rows: Vec<Vec<String>> = stages

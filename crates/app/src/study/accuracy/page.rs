@@ -9,7 +9,7 @@ use super::compare::pareto_front;
 use super::table::{PERIOD_US, cells, csv, name, percent};
 use super::{Axis, Errors, Measured, Row, Study, store};
 use crate::Error;
-use crate::report::html::{STYLE, escaped};
+use crate::report::html::{escaped, head};
 use crate::report::plot::short;
 use crate::report::work_precision::{PlotPoint, Scale, error_over_cost, force_curves};
 
@@ -167,6 +167,8 @@ fn to_json(study: &Study) -> String {
     let mut text = serde_json::to_string_pretty(&json!({
         "title": study.title,
         "sentence": study.sentence(),
+        "made": study.origin.made,
+        "input_hash": study.origin.hash(),
         "machine": study.machine,
         "load": study.load,
         "busy": study.busy(),
@@ -207,16 +209,12 @@ makes 60 times a second. No slow step is left out.</li>\
 
 fn page(study: &Study, plots: [&String; 4], curves: &str) -> String {
     let mut page = String::new();
-    let title = escaped(&study.title);
-    page.push_str("<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n");
-    page.push_str("<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n");
-    let _ = writeln!(page, "<title>{title}: accuracy and time</title>");
-    let _ = writeln!(page, "<style>{STYLE}</style></head><body><main>");
-    let _ = writeln!(page, "<h1>{title}: what accuracy costs in time</h1>");
-    let _ = writeln!(
-        page,
-        "<p class=\"where\">{}</p>",
-        escaped(&study.scene_path)
+    head::open(
+        &mut page,
+        &format!("{}: what accuracy costs in time", study.title),
+        "accuracy and time",
+        &study.scene_path,
+        &study.origin,
     );
     let _ = writeln!(
         page,
@@ -245,7 +243,7 @@ fn page(study: &Study, plots: [&String; 4], curves: &str) -> String {
     let figure = |page: &mut String, svg: &str, caption: &str| {
         let _ = writeln!(
             page,
-            "<figure>{svg}<figcaption>{}</figcaption></figure>",
+            "<figure class=\"plot\"><div class=\"scroll wordy\">{svg}</div><figcaption>{}</figcaption></figure>",
             escaped(caption)
         );
     };
@@ -291,7 +289,7 @@ fn page(study: &Study, plots: [&String; 4], curves: &str) -> String {
         }
         let _ = writeln!(
             page,
-            "<h3>{}</h3><div class=\"scroll\"><table>{HEAD}",
+            "<h3>{}</h3><div class=\"scroll\"><table class=\"numbers\">{HEAD}",
             escaped(axis.title())
         );
         for row in rows {
@@ -342,12 +340,7 @@ fn page(study: &Study, plots: [&String; 4], curves: &str) -> String {
         );
     }
     let _ = writeln!(page, "</ul><h2>How to read this</h2>{HOW_TO_READ}");
-    let _ = writeln!(
-        page,
-        "<footer>Written by snapin {} on {}.</footer></main></body></html>",
-        env!("CARGO_PKG_VERSION"),
-        escaped(&study.machine)
-    );
+    head::close(&mut page, &study.machine);
     page
 }
 
@@ -374,7 +367,7 @@ fn table_cells(study: &Study, measured: &Measured, errors: &Errors) -> String {
         .enumerate()
         .map(|(k, cell)| {
             let grey = if k == 5 && is_below {
-                " style=\"color:#888\""
+                " class=\"soft\""
             } else {
                 ""
             };

@@ -13,6 +13,7 @@ mod multiply;
 mod p_method;
 mod plausibility;
 mod random_scenes;
+mod report;
 mod scenes;
 mod shape_on_gpu;
 mod storage;

@@ -59,6 +59,13 @@ impl Look {
     }
 }
 
+/// A curve as it is drawn, in mm and N.
+struct Line {
+    key: Key,
+    look: Look,
+    points: Vec<(f64, f64)>,
+}
+
 /// A point to be named on the plot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mark {
@@ -123,7 +130,7 @@ pub fn force_travel(
     mark: Option<&Mark>,
     format: Format,
 ) -> Result<String, Box<dyn Error>> {
-    let lines: Vec<(Key, Look, Vec<(f64, f64)>)> = series
+    let lines: Vec<Line> = series
         .iter()
         .map(|s| {
             let key = Key {
@@ -132,14 +139,18 @@ pub fn force_travel(
             };
             let points = s.points.iter().map(|&(x, y)| (x * 1e3, y));
             let points = points.filter(|p| p.0.is_finite() && p.1.is_finite());
-            (key, s.look, points.collect())
+            Line {
+                key,
+                look: s.look,
+                points: points.collect(),
+            }
         })
         .collect();
-    let all = || lines.iter().flat_map(|(.., points)| points);
+    let all = || lines.iter().flat_map(|line| &line.points);
     let (x0, x1) = range(all().map(|p| p.0));
     let (y0, y1) = range(all().map(|p| p.1).chain([0.0]));
     let room = 0.08 * (y1 - y0);
-    let keys: Vec<Key> = lines.iter().map(|(key, ..)| key.clone()).collect();
+    let keys: Vec<Key> = lines.iter().map(|line| line.key.clone()).collect();
     draw(format, &keys, |root| {
         let mut chart = ChartBuilder::on(root)
             .margin(12 * FINE)
@@ -170,8 +181,8 @@ pub fn force_travel(
             Look::Reference => 4,
         };
         let mut order: Vec<_> = lines.iter().collect();
-        order.sort_by_key(|(_, look, _)| rank(*look));
-        for (key, _, points) in order {
+        order.sort_by_key(|line| rank(line.look));
+        for Line { key, points, .. } in order {
             if key.is_dashed {
                 let (dash, space) = (8 * FINE, 5 * FINE);
                 let line = DashedLineSeries::new(points.clone(), dash, space, key.style());

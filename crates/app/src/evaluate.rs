@@ -18,7 +18,7 @@ use crate::machine::Machine;
 use crate::prepare::PreparedPart;
 use crate::report::{
     ContactForce, Effect, Facts, Frame, Handbook, HandbookRow, MultiplyFacts, MultiplyRace, Origin,
-    Outputs, PaperStage, Phase, RateFacts, Run, StepRow, TwoRateFacts, View, Warning,
+    Outputs, PaperStage, Phase, RateFacts, Run, StepRow, TwoRateFacts, View, Viewing, Warning,
 };
 use crate::scene::{EffectChoice, Handle, Scene, ToolShape};
 use crate::session::{Record, Recording, part_extent};
@@ -144,7 +144,7 @@ impl Story<'_> {
                     why: v.why,
                 })
                 .collect(),
-            view: view(scene),
+            viewing: viewing(scene, recording.direction),
             outputs: Outputs {
                 png: scene.output.pictures,
                 vtu: scene.output.vtu,
@@ -388,20 +388,33 @@ fn choice(scene: &Scene, effect: &str) -> EffectChoice {
     }
 }
 
-/// Along the tool's axis if it has one, else across the approach.
-fn view(scene: &Scene) -> View {
+/// As the scene says; else along the tool's axis if it has one, or across the approach.
+fn viewing(scene: &Scene, approach: DVec3) -> Viewing {
     let axis = match scene.tool.shape {
         ToolShape::Cylinder { .. } | ToolShape::Capsule { .. } => {
             scene.tool.pose_part_tool.rotation * DVec3::Z
         }
-        _ => scene.hand.direction.any_orthonormal_vector(),
+        _ => approach.any_orthonormal_vector(),
     };
-    let up = if axis.y.abs() < 0.9 {
-        DVec3::Y
-    } else {
-        DVec3::Z
+    let up_beside = |axis: DVec3| {
+        if axis.y.abs() < 0.9 {
+            DVec3::Y
+        } else {
+            DVec3::Z
+        }
     };
-    View::three_quarter(-axis, up)
+    let view = match scene.output.camera {
+        Some(camera) => View {
+            direction: -camera,
+            up: up_beside(camera),
+        },
+        None => View::three_quarter(-axis, up_beside(axis)),
+    };
+    Viewing {
+        view,
+        is_fixed: scene.output.camera.is_some(),
+        approach,
+    }
 }
 
 /// The paper's three times beside the medians of the same work here, while something touches.

@@ -28,7 +28,7 @@ pub use curve::Curve;
 pub use data::{
     CellKind, ContactForce, Effect, Facts, Frame, Handbook, HandbookRow, MultiplyFacts,
     MultiplyRace, N_STAGES, Outputs, PaperStage, PartDrawing, Phase, RateFacts, Run, STAGE_NAMES,
-    StepRow, TwoRateFacts, View, Warning,
+    StepRow, TwoRateFacts, View, Viewing, Warning,
 };
 pub use error::ReportError;
 pub use origin::{InputFile, Origin};

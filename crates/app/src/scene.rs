@@ -656,10 +656,12 @@ pub enum EffectChoice {
 }
 
 /// Which results are written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Output {
     /// Number of moments of which pictures and shapes are kept.
     pub frames: u32,
+    /// Unit vector from the part to the eye; `None` to choose it by the contact.
+    pub camera: Option<DVec3>,
     /// PNG of each frame.
     pub pictures: bool,
     /// VTU (ParaView) of each frame.

@@ -58,7 +58,7 @@ pub struct Run {
     /// Every physical effect with its number and verdict.
     pub effects: Vec<Effect>,
     /// Where the pictures are taken from.
-    pub view: View,
+    pub viewing: Viewing,
     /// Which of the larger files are written.
     pub outputs: Outputs,
 }
@@ -385,6 +385,17 @@ pub struct View {
     pub direction: DVec3,
     /// What points up in the picture; not along `direction`.
     pub up: DVec3,
+}
+
+/// Where the pictures are taken from, and what another place is chosen by if contact is hidden there.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Viewing {
+    /// As it is if nothing speaks against it.
+    pub view: View,
+    /// Whether it was asked for: then it is kept, whatever it shows.
+    pub is_fixed: bool,
+    /// Way of the held body, of any length; zero keeps the view.
+    pub approach: DVec3,
 }
 
 impl View {

@@ -1,5 +1,6 @@
 //! Numbers as people read them: few digits, and none below what the run can tell.
 
+use super::data::{Frame, Run};
 use super::plot::short;
 
 /// Share of a scale below which a number says nothing: pictures and captions stand beside numbers of three digits.
@@ -18,8 +19,37 @@ pub(crate) fn beside(value: f64, scale: f64) -> String {
     short(if kept == 0.0 { 0.0 } else { kept })
 }
 
+/// What travel and force of a run reach, for the captions of its frames.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RunScale {
+    travel_m: f64,
+    force_n: f64,
+}
+
+impl RunScale {
+    pub(crate) fn of(run: &Run) -> Self {
+        let (rows, frames) = (|| run.rows.iter(), || run.frames.iter());
+        let travel = rows().map(|r| r.travel_m);
+        let force = rows().map(|r| r.force_n);
+        Self {
+            travel_m: largest(travel.chain(frames().map(|f| f.travel_m))),
+            force_n: largest(force.chain(frames().map(|f| f.force_n))),
+        }
+    }
+
+    /// Travel of a frame, mm.
+    pub(crate) fn travel_mm(&self, frame: &Frame) -> String {
+        beside(frame.travel_m * 1e3, self.travel_m * 1e3)
+    }
+
+    /// Force of a frame, N.
+    pub(crate) fn force_n(&self, frame: &Frame) -> String {
+        beside(frame.force_n, self.force_n)
+    }
+}
+
 /// Largest size of the finite `values`; 0 of none.
-pub(crate) fn largest(values: impl Iterator<Item = f64>) -> f64 {
+fn largest(values: impl Iterator<Item = f64>) -> f64 {
     values
         .filter(|v| v.is_finite())
         .fold(0.0, |max, v| v.abs().max(max))

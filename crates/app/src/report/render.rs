@@ -7,15 +7,21 @@ mod camera;
 mod canvas;
 mod colour;
 mod overlay;
+mod paint;
+mod section;
 mod surface;
+mod viewpoint;
 
 use glam::DVec3;
 
 use self::camera::Camera;
-use self::canvas::{Canvas, Layer};
+use self::canvas::Canvas;
 use self::overlay::{ColourBar, Overlay};
+use self::paint::Painter;
+use self::section::Cut;
 use self::surface::Surface;
 use super::data::{Frame, PartDrawing, Run};
+use super::digits::RunScale;
 use super::plot::short;
 
 /// Width and height of a picture, pixels.
@@ -61,7 +67,10 @@ impl Quantity {
 #[derive(Clone, Debug)]
 pub struct Scene {
     title: String,
+    scale: RunScale,
     camera: Camera,
+    /// Where part and tool are cut open.
+    cut: Option<Cut>,
     /// Top of the colour scale, m.
     displacement_top: f64,
     /// Top of the colour scale, Pa.
@@ -115,9 +124,12 @@ impl Scene {
             .map(|p| p.clamp(low - DVec3::splat(reach), high + DVec3::splat(reach)))
             .collect();
         points.extend(near);
+        let viewpoint = viewpoint::choose(run, &points);
         Self {
             title: run.title.clone(),
-            camera: Camera::fit(&run.view, &points, STAGE.map(|v| v * SAMPLES as f64)),
+            scale: RunScale::of(run),
+            camera: Camera::fit(&viewpoint.view, &points, STAGE.map(|v| v * SAMPLES as f64)),
+            cut: viewpoint.cut,
             displacement_top,
             stress_top,
             strain_top: run.strain.value(),
@@ -176,123 +188,62 @@ impl Scene {
             .collect();
         let body = Surface::new(nodes, part.triangles.clone());
         let shades: Vec<f32> = values.iter().map(|&v| (v / bar.top) as f32).collect();
-        self.draw_part(&mut canvas.solid, &body, part, &shades);
-        let tool = Surface::welded(&frame.tool);
-        self.draw_tool(&mut canvas.glass, &tool);
+        let painter = Painter {
+            camera: &self.camera,
+            cut: self.cut.as_ref(),
+        };
+        painter.part(&mut canvas.solid, &body, part, &shades);
+        painter.tool(&mut canvas.glass, &Surface::welded(&frame.tool));
         canvas.lay_glass_over_solid();
-        self.draw_arrows(&mut canvas.solid, frame);
+        if self.force_max > 0.0 {
+            let per_newton =
+                ARROW * SAMPLES as f64 / self.camera.pixels_per_metre() / self.force_max;
+            painter.arrows(&mut canvas.solid, &frame.contacts, per_newton);
+        }
 
         let mut picture = Overlay::new(canvas.bytes(), SIZE, SAMPLES);
-        let force = frame
-            .contacts
-            .iter()
-            .map(|c| c.force)
-            .sum::<DVec3>()
-            .length();
         let moment = format!(
             "{}    travel {} mm    force {} N    step {}",
             frame.label,
-            short(frame.travel_m * 1e3),
-            short(frame.force_n),
+            self.scale.travel_mm(frame),
+            self.scale.force_n(frame),
             frame.step,
         );
-        picture.text(&self.title, (40, 30), 32);
-        picture.text(&moment, (40, 74), 22);
+        picture.text(&self.title, (40, 22), 37);
+        picture.text(&moment, (40, 72), 27);
         let largest =
             finite(self.surface_nodes.iter().map(|&n| values[n as usize])).fold(0.0, f64::max);
         picture.colour_bar(&bar, largest);
         picture.axes(&self.camera);
         picture.scale_bar(self.camera.pixels_per_metre() / SAMPLES as f64);
-        let arrows = if frame.contacts.is_empty() {
-            "no contact".to_owned()
-        } else {
-            format!(
-                "arrows: {} contact forces on the part, longest {} N, resultant {} N",
-                frame.contacts.len(),
-                short(finite(frame.contacts.iter().map(|c| c.force.length())).fold(0.0, f64::max)),
-                short(force),
-            )
-        };
-        picture.text(&format!("shape to scale    {arrows}"), (330, 916), 19);
+        picture.text(&self.legend(frame, quantity, &painter), (350, 908), 25);
         Ok(averaged(&picture.finish()?, SIZE, SAMPLES))
     }
+}
 
-    fn draw_part(&self, layer: &mut Layer, body: &Surface, part: &PartDrawing, shades: &[f32]) {
-        let map = colour::map();
-        let projected = self.camera.project_all(&body.nodes);
-        for (triangle_idx, triangle) in body.triangles.iter().enumerate() {
-            let corners = triangle.map(|n| projected[n as usize]);
-            let value = triangle.map(|n| shades[n as usize]);
-            let light = body.corner_normals[triangle_idx].map(|n| self.camera.light(n) as f32);
-            layer.triangle(corners, |weights| {
-                let mix = |v: [f32; 3]| v[0] * weights[0] + v[1] * weights[1] + v[2] * weights[2];
-                let lit = mix(light);
-                (colour::at(&map, mix(value)).map(|c| c * lit), 1.0)
-            });
+impl Scene {
+    /// The line below the picture: how the shape is drawn, and what the arrows are.
+    fn legend(&self, frame: &Frame, quantity: Quantity, painter: &Painter<'_>) -> String {
+        let shape = match self.cut {
+            Some(_) if quantity == Quantity::Strain => "cut open, skin's strain",
+            Some(_) => "to scale, cut open",
+            None => "to scale",
+        };
+        if frame.contacts.is_empty() {
+            return format!("{shape}; no contact");
         }
-        for edge in &part.edges {
-            for pair in edge.windows(2) {
-                let ends = [projected[pair[0] as usize], projected[pair[1] as usize]];
-                layer.line(ends, 1.5, [0.06, 0.07, 0.10], 0.42);
-            }
-        }
-        for pair in &body.creases {
-            layer.line(
-                pair.map(|n| projected[n as usize]),
-                2.6,
-                [0.05, 0.06, 0.09],
-                0.85,
-            );
-        }
-    }
-
-    fn draw_tool(&self, layer: &mut Layer, tool: &Surface) {
-        let projected = self.camera.project_all(&tool.nodes);
-        for (triangle, normals) in tool.triangles.iter().zip(&tool.corner_normals) {
-            let light = normals.map(|n| self.camera.light(n) as f32);
-            // Glass is seen best where it is grazed.
-            let facing = normals.map(|n| self.camera.facing(n) as f32);
-            layer.triangle(triangle.map(|n| projected[n as usize]), |weights| {
-                let mix = |v: [f32; 3]| v[0] * weights[0] + v[1] * weights[1] + v[2] * weights[2];
-                let grazing = 1.0 - mix(facing);
-                let lit = mix(light);
-                (
-                    [0.74 * lit, 0.77 * lit, 0.81 * lit],
-                    0.38 + 0.4 * grazing * grazing,
-                )
-            });
-        }
-        for pair in &tool.creases {
-            layer.line(
-                pair.map(|n| projected[n as usize]),
-                2.4,
-                [0.35, 0.38, 0.42],
-                0.9,
-            );
-        }
-    }
-
-    /// Arrows end at the contact points. They lie over everything: a force that is hidden by the
-    /// part is still a force.
-    fn draw_arrows(&self, layer: &mut Layer, frame: &Frame) {
-        if self.force_max <= 0.0 {
-            return;
-        }
-        let metres_per_newton =
-            ARROW * SAMPLES as f64 / self.camera.pixels_per_metre() / self.force_max;
-        let mut arrows: Vec<[[f64; 3]; 2]> = frame
-            .contacts
-            .iter()
-            .map(|c| {
-                let tail = c.point - c.force * metres_per_newton;
-                [self.camera.project(tail), self.camera.project(c.point)]
-            })
-            .filter(|ends| ends.iter().flatten().all(|v| v.is_finite()))
-            .collect();
-        arrows.sort_by(|a, b| b[1][2].total_cmp(&a[1][2]));
-        for ends in arrows {
-            layer.arrow(ends, [0.80, 0.10, 0.32]);
-        }
+        let lengths = frame.contacts.iter().map(|c| c.force.length());
+        let resultant = frame.contacts.iter().map(|c| c.force).sum::<DVec3>();
+        let drawn = frame.contacts.iter().filter(|c| painter.has(c)).count();
+        let of_all = match frame.contacts.len() {
+            all if all == drawn => String::new(),
+            all => format!(" of {all}"),
+        };
+        format!(
+            "{shape}; {drawn}{of_all} forces on the part, largest {} N, resultant {} N",
+            short(finite(lengths).fold(0.0, f64::max)),
+            short(resultant.length()),
+        )
     }
 }
 
@@ -370,6 +321,34 @@ mod tests {
             })
             .count();
         assert!(coloured > 50_000, "{coloured}");
+    }
+
+    /// The ring of the sample closed by a way along its axis and a camera that sees nothing: cut open, the inside is in the part's
+    /// colours and the pin's is hatched.
+    #[test]
+    fn a_cut_picture_shows_the_inside() {
+        let run = sample::run();
+        let mut scene = Scene::of(&run);
+        let whole = scene
+            .pixels(&run.part, &run.frames[1], Quantity::VonMises)
+            .unwrap();
+        scene.cut = Some(Cut {
+            point: DVec3::ZERO,
+            normal: -run.viewing.view.direction.reject_from(DVec3::Y).normalize(),
+            slack: 1e-5,
+        });
+        let cut = scene
+            .pixels(&run.part, &run.frames[1], Quantity::VonMises)
+            .unwrap();
+        let n_changed = whole.iter().zip(&cut).filter(|(a, b)| a != b).count();
+        assert!(n_changed > 100_000, "{n_changed}");
+        let painter = Painter {
+            camera: &scene.camera,
+            cut: scene.cut.as_ref(),
+        };
+        let legend = scene.legend(&run.frames[1], Quantity::VonMises, &painter);
+        assert!(legend.starts_with("to scale, cut open; "), "{legend}");
+        assert!(legend.contains(" of "), "{legend}");
     }
 
     #[test]

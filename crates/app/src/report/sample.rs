@@ -287,7 +287,7 @@ pub(super) fn run() -> Run {
                 why: "no density given".into(),
             },
         ],
-        view: View::default(),
+        viewing: Viewing::default(),
         outputs: Outputs::default(),
     }
 }

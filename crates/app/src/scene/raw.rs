@@ -553,6 +553,10 @@ pub(super) struct OutputRaw {
     /// Moments of which pictures and shapes are kept, 0 to 1000.
     #[schemars(range(min = 0, max = 1000), extend("default" = default::FRAMES))]
     pub(super) frames: Option<At<i64>>,
+    /// From where the pictures are taken: direction from the part to the eye, in the part's frame; any length but 0. Without it
+    /// the view that shows most of the contact is chosen, and where no view shows it part and tool are drawn cut open.
+    #[schemars(extend("x-quantity" = "number", "x-default" = "where contact is seen best"))]
+    pub(super) camera: Option<At<Vector<3>>>,
     /// Write a PNG of each frame.
     #[schemars(extend("default" = true))]
     pub(super) pictures: Option<bool>,

@@ -117,6 +117,7 @@ fn scene_has_what_is_written_and_the_defaults() {
         scene.output,
         Output {
             frames: 6,
+            camera: None,
             pictures: true,
             vtu: true,
             mcap: true
@@ -546,6 +547,10 @@ fn refusals_name_line_key_and_mend() {
         (
             adding("[output]\nframes = -1\n"),
             "clip.toml:22: frames -1 is out of range; write 0 to 1000",
+        ),
+        (
+            adding("[output]\ncamera = [0, 0, 0]\n"),
+            "clip.toml:22: camera [0.0, 0.0, 0.0] has no direction; write where it points, such as [0.0, -1.0, 0.0]",
         ),
         (
             adding(

@@ -589,6 +589,11 @@ impl Check<'_> {
         })?;
         Ok(Output {
             frames: frames as u32,
+            camera: raw
+                .camera
+                .as_ref()
+                .map(|at| self.direction("camera", at))
+                .transpose()?,
             pictures: raw.pictures.unwrap_or(true),
             vtu: raw.vtu.unwrap_or(true),
             mcap: raw.mcap.unwrap_or(true),

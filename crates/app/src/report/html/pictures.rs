@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::super::data::{Frame, Run};
-use super::super::digits::{beside, largest};
+use super::super::data::Run;
+use super::super::digits::RunScale;
 use super::super::render::Quantity;
 use super::blocks::section;
 use super::text::{escaped, push_base64};
@@ -28,17 +28,18 @@ pub(super) fn pictures(page: &mut String, run: &Run, pictures: &[Picture]) {
         return;
     }
     section(page, "Pictures");
-    let scale = Scale::of(run);
+    let scale = RunScale::of(run);
     page.push_str("<div class=\"pictures\">");
     for picture in pictures {
         let Some(frame) = run.frames.get(picture.frame) else {
             continue;
         };
         let caption = escaped(&format!(
-            "{}: {}, {}",
+            "{}: {}, {} mm of travel, {} N",
             frame.label,
             picture.quantity.name(),
-            scale.words(frame)
+            scale.travel_mm(frame),
+            scale.force_n(frame)
         ));
         let _ = write!(
             page,
@@ -49,33 +50,4 @@ pub(super) fn pictures(page: &mut String, run: &Run, pictures: &[Picture]) {
         let _ = writeln!(page, "\"></a><figcaption>{caption}</figcaption></figure>");
     }
     page.push_str("</div>\n");
-}
-
-/// What travel and force of a run reach: digits far below are round-off.
-struct Scale {
-    travel_m: f64,
-    force_n: f64,
-}
-
-impl Scale {
-    fn of(run: &Run) -> Self {
-        let rows = || run.rows.iter();
-        let frames = || run.frames.iter();
-        Self {
-            travel_m: largest(
-                rows()
-                    .map(|r| r.travel_m)
-                    .chain(frames().map(|f| f.travel_m)),
-            ),
-            force_n: largest(rows().map(|r| r.force_n).chain(frames().map(|f| f.force_n))),
-        }
-    }
-
-    fn words(&self, frame: &Frame) -> String {
-        format!(
-            "{} mm of travel, {} N",
-            beside(frame.travel_m * 1e3, self.travel_m * 1e3),
-            beside(frame.force_n, self.force_n)
-        )
-    }
 }

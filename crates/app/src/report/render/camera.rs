@@ -78,6 +78,23 @@ impl Camera {
         ]
     }
 
+    /// Depth of a plane at a column and row, all in samples; infinite for one that is seen edge on.
+    pub(super) fn depth_of_plane(
+        &self,
+        point: DVec3,
+        normal: DVec3,
+    ) -> impl Fn(f64, f64) -> f64 + use<> {
+        let [x, y, z] = self.project(point);
+        let (right, down) = (normal.dot(self.right), -normal.dot(self.up));
+        let into = normal.dot(self.into);
+        move |column, row| {
+            if into.abs() < 1e-9 {
+                return f64::INFINITY;
+            }
+            z - ((column - x) * right + (row - y) * down) / into
+        }
+    }
+
     pub(super) fn project_all(&self, points: &[DVec3]) -> Vec<[f64; 3]> {
         points.iter().map(|&p| self.project(p)).collect()
     }
@@ -107,6 +124,25 @@ impl Camera {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_plane_is_as_deep_as_its_points() {
+        let view = View {
+            direction: DVec3::new(-1.0, -0.3, -0.4),
+            up: DVec3::Y,
+        };
+        let camera = Camera::fit(&view, &[DVec3::ZERO, DVec3::ONE], [0.0, 0.0, 100.0, 80.0]);
+        let (point, normal) = (DVec3::new(0.2, 0.1, 0.3), DVec3::new(0.8, 0.0, 0.6));
+        let depth = camera.depth_of_plane(point, normal);
+        for shift in [DVec3::Y, DVec3::new(-0.6, 0.5, 0.8)] {
+            let [x, y, z] = camera.project(point + shift);
+            assert!((depth(x, y) - z).abs() < 1e-9);
+        }
+        assert_eq!(
+            camera.depth_of_plane(point, camera.right)(3.0, 4.0),
+            f64::INFINITY
+        );
+    }
 
     #[test]
     fn points_stay_on_the_stage_and_up_is_up() {

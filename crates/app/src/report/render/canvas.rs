@@ -4,6 +4,9 @@
 /// surface, shallow enough not to show through a thin wall.
 const LINE_BIAS: f32 = 3.0;
 
+/// Distance of the lines of a hatching along a row, samples.
+const HATCH: usize = 28;
+
 /// Background at the top and at the bottom of the picture.
 const SKY: [[f32; 3]; 2] = [[1.0, 1.0, 1.0], [0.905, 0.925, 0.945]];
 
@@ -25,7 +28,7 @@ pub(super) struct Canvas {
 }
 
 impl Layer {
-    fn new(width: usize, height: usize) -> Self {
+    pub(super) fn new(width: usize, height: usize) -> Self {
         let n = width * height;
         Self {
             width,
@@ -37,11 +40,11 @@ impl Layer {
     }
 
     /// Fills the samples of a triangle that are nearer than what is there. `shade` gets the
-    /// weights of the corners and gives colour and cover.
+    /// weights of the corners and gives colour and cover, or nothing where the triangle is cut away.
     pub(super) fn triangle(
         &mut self,
         corners: [[f64; 3]; 3],
-        shade: impl Fn([f32; 3]) -> ([f32; 3], f32),
+        shade: impl Fn([f32; 3]) -> Option<([f32; 3], f32)>,
     ) {
         if !corners.iter().flatten().all(|v| v.is_finite()) {
             return;
@@ -71,11 +74,69 @@ impl Layer {
                 let depth = (weights[0] * a[2] + weights[1] * b[2] + third * c[2]) as f32;
                 let at = row * self.width + column;
                 if depth < self.depth[at] {
-                    self.depth[at] = depth;
                     let weights = [weights[0] as f32, weights[1] as f32, third as f32];
-                    (self.colour[at], self.cover[at]) = shade(weights);
+                    if let Some(shaded) = shade(weights) {
+                        self.depth[at] = depth;
+                        (self.colour[at], self.cover[at]) = shaded;
+                    }
                 }
             }
+        }
+    }
+
+    /// Fills what closed lines in a plane enclose (holes stay empty), hatched as cut faces are in drawings. `depth` gives that of the plane
+    /// at a sample.
+    pub(super) fn hatched(
+        &mut self,
+        lines: &[[[f64; 3]; 2]],
+        depth: impl Fn(f64, f64) -> f64,
+        colours: [[f32; 3]; 2],
+        cover: f32,
+    ) {
+        let mut crossings: Vec<Vec<f64>> = vec![Vec::new(); self.height];
+        let finite = lines
+            .iter()
+            .filter(|l| l.iter().flatten().all(|v| v.is_finite()));
+        for [a, b] in finite {
+            let (low, high) = if a[1] < b[1] { (a, b) } else { (b, a) };
+            for row in span([low[1], high[1], low[1]], 0.0, self.height) {
+                let y = row as f64 + 0.5;
+                if low[1] <= y && y < high[1] {
+                    let share = (y - low[1]) / (high[1] - low[1]);
+                    crossings[row].push(low[0] + share * (high[0] - low[0]));
+                }
+            }
+        }
+        for (row, crossings) in crossings.iter_mut().enumerate() {
+            // A line that does not close is none.
+            if crossings.len() % 2 == 1 {
+                continue;
+            }
+            crossings.sort_by(f64::total_cmp);
+            for pair in crossings.chunks_exact(2) {
+                let first = (pair[0] - 0.5).ceil().max(0.0) as usize;
+                let last = ((pair[1] - 0.5).ceil().max(0.0) as usize).min(self.width);
+                for column in first..last {
+                    let at = row * self.width + column;
+                    let here = depth(column as f64 + 0.5, row as f64 + 0.5) as f32;
+                    if here < self.depth[at] {
+                        let is_line = (row + column) % HATCH < HATCH / 7;
+                        self.depth[at] = here;
+                        self.colour[at] = colours[usize::from(is_line)];
+                        self.cover[at] = cover;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Depth of the nearest thing at a place, infinite where nothing is or off the layer.
+    pub(super) fn depth_at(&self, x: f64, y: f64) -> f64 {
+        let is_on = (0.0..self.width as f64).contains(&x) && (0.0..self.height as f64).contains(&y);
+        if is_on {
+            f64::from(self.depth[y as usize * self.width + x as usize])
+        } else {
+            f64::INFINITY
         }
     }
 
@@ -204,8 +265,8 @@ mod tests {
     fn quad(layer: &mut Layer, depth: f64, colour: [f32; 3], cover: f32) {
         let [a, b, c, d] =
             [[0.0, 0.0], [8.0, 0.0], [8.0, 8.0], [0.0, 8.0]].map(|[x, y]| [x, y, depth]);
-        layer.triangle([a, b, c], |_| (colour, cover));
-        layer.triangle([a, c, d], |_| (colour, cover));
+        layer.triangle([a, b, c], |_| Some((colour, cover)));
+        layer.triangle([a, c, d], |_| Some((colour, cover)));
     }
 
     #[test]
@@ -256,7 +317,9 @@ mod tests {
         for far in [1e30, -1e30, f64::NAN, f64::INFINITY] {
             canvas
                 .solid
-                .triangle([[0.0; 3], [far, 0.0, 0.0], [0.0, far, 0.0]], |_| (RED, 1.0));
+                .triangle([[0.0; 3], [far, 0.0, 0.0], [0.0, far, 0.0]], |_| {
+                    Some((RED, 1.0))
+                });
             canvas
                 .solid
                 .line([[0.0; 3], [far, 1.0, 0.0]], 2.0, RED, 1.0);
@@ -264,5 +327,34 @@ mod tests {
         canvas
             .solid
             .arrow([[-100.0, -100.0, 0.0], [-50.0, 300.0, 0.0]], RED);
+    }
+
+    /// A square with a square hole, behind and in front of what is there.
+    #[test]
+    fn a_hatched_face_keeps_its_holes_and_its_depth() {
+        let square = |low: f64, high: f64| {
+            let corners = [
+                [low, low],
+                [high, low],
+                [high, high],
+                [low, high],
+                [low, low],
+            ];
+            let corners = corners.map(|[x, y]| [x, y, 0.0]);
+            [0, 1, 2, 3].map(|i| [corners[i], corners[i + 1]])
+        };
+        let lines = [square(1.0, 7.0), square(3.0, 5.0)].concat();
+        let mut layer = Layer::new(8, 8);
+        layer.hatched(&lines, |x, _| x, [RED; 2], 1.0);
+        let filled = layer.cover.iter().filter(|c| **c == 1.0).count();
+        assert_eq!(filled, 36 - 4);
+        assert_eq!(layer.depth_at(2.5, 2.5), 2.5);
+        assert_eq!(layer.depth_at(4.5, 4.5), f64::INFINITY);
+        assert_eq!(layer.depth_at(-1.0, 4.0), f64::INFINITY);
+        layer.hatched(&lines, |_, _| 9.0, [BLUE; 2], 1.0);
+        assert_eq!(layer.depth_at(2.5, 2.5), 2.5);
+        // Lines that do not close fill nothing, and do no harm.
+        layer.hatched(&lines[..3], |_, _| 0.0, [BLUE; 2], 1.0);
+        assert!(layer.colour.iter().all(|c| *c != BLUE));
     }
 }

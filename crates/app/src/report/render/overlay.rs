@@ -15,7 +15,7 @@ const INK: RGBColor = RGBColor(30, 33, 38);
 type Area<'a> = DrawingArea<BitMapBackend<'a>, Shift>;
 
 /// Left, top, width and height of the colour bar, pixels.
-const BAR: (i32, i32, i32, i32) = (1130, 200, 28, 560);
+const BAR: (i32, i32, i32, i32) = (1130, 212, 30, 540);
 
 /// A colour scale from zero to a round number.
 #[derive(Clone, Debug)]
@@ -149,16 +149,14 @@ impl Overlay {
         for tick in bar.ticks() {
             let y = bottom - (f64::from(height) * tick / bar.top).round() as i32;
             self.line([(right, y), (right + 7, y)], 1, INK);
-            self.text(&short(tick), (right + 13, y - 10), 19);
+            self.text(&short(tick), (right + 13, y - 14), 25);
         }
-        self.text(bar.name, (left - 30, top - 78), 20);
-        self.text(&format!("({})", bar.unit), (left - 30, top - 54), 19);
-        self.text("largest", (left - 30, bottom + 18), 19);
-        self.text(
-            &format!("{} {}", short(largest), bar.unit),
-            (left - 30, bottom + 40),
-            19,
-        );
+        let start = left - 62;
+        self.text(bar.name, (start, top - 92), 25);
+        self.text(&format!("({})", bar.unit), (start, top - 62), 25);
+        self.text("largest", (start, bottom + 18), 25);
+        let largest = format!("{} {}", short(largest), bar.unit);
+        self.text(&largest, (start, bottom + 48), 25);
     }
 
     /// Directions of the part's axes.
@@ -178,7 +176,7 @@ impl Overlay {
             };
             self.line([origin, along(46.0)], 3, colour);
             let (x, y) = along(60.0);
-            self.coloured_text(name, (x - 5, y - 11), 20, colour);
+            self.coloured_text(name, (x - 7, y - 15), 27, colour);
         }
     }
 
@@ -197,8 +195,8 @@ impl Overlay {
         }
         self.text(
             &format!("{} mm", short(millimetres)),
-            (right + 12, y - 11),
-            19,
+            (right + 12, y - 16),
+            25,
         );
     }
 

@@ -1,6 +1,7 @@
 //! From a recording to what the report tells: moments worth a picture, extremes, verdicts.
 
 mod drawing;
+mod handbook;
 mod moments;
 mod skin;
 pub(crate) mod strain;
@@ -17,8 +18,8 @@ use crate::fields::FieldSolver;
 use crate::machine::Machine;
 use crate::prepare::PreparedPart;
 use crate::report::{
-    ContactForce, Effect, Facts, Frame, Handbook, HandbookRow, MultiplyFacts, MultiplyRace, Origin,
-    Outputs, PaperStage, Phase, RateFacts, Run, StepRow, TwoRateFacts, View, Viewing, Warning,
+    ContactForce, Effect, Facts, Frame, MultiplyFacts, MultiplyRace, Origin, Outputs, PaperStage,
+    Phase, RateFacts, Run, StepRow, TwoRateFacts, View, Viewing, Warning,
 };
 use crate::scene::{EffectChoice, Handle, Scene, ToolShape};
 use crate::session::{Record, Recording, part_extent};
@@ -128,7 +129,7 @@ impl Story<'_> {
                 rates: rate_facts(recording),
                 multiply: multiply_facts(self.shape),
             },
-            handbook: self.handbook(&rows, strained.facts.value()),
+            handbook: handbook::beside(scene, &rows, recording.direction, strained.facts.value()),
             strain: strained.facts,
             paper: paper(&rows),
             rows,
@@ -260,75 +261,6 @@ impl Story<'_> {
             .filter(|&i| force(i) < 0.0)
             .map(|i| at(i).reversed());
         (at(peak), release, has_passed)
-    }
-
-    fn handbook(&self, rows: &[StepRow], strain: f64) -> Option<Handbook> {
-        let hook = self.scene.handbook.as_ref()?;
-        let young_modulus = self.scene.part.material.young_modulus;
-        let frictionless = crate::scene::Handbook {
-            friction: 0.0,
-            ..*hook
-        };
-        let touch = rows
-            .iter()
-            .find(|r| r.contacts > 0)
-            .map_or(0.0, |r| r.travel_m);
-        let peak = rows.iter().map(|r| r.force_n).fold(0.0, f64::max);
-        let direction = self.recording.direction;
-        let across = rows
-            .iter()
-            .map(|r| r.force_on_handle.reject_from(direction).length())
-            .fold(0.0, f64::max);
-        let row = |label: &str, handbook: f64, computed: f64, unit: &str| HandbookRow {
-            label: label.to_owned(),
-            handbook,
-            computed,
-            unit: unit.to_owned(),
-        };
-        let mut compared = vec![
-            row(
-                "mating force",
-                frictionless.mating_force(young_modulus),
-                peak,
-                "N",
-            ),
-            row(
-                "largest force across",
-                frictionless.deflection_force(young_modulus),
-                across,
-                "N",
-            ),
-            row(
-                "largest strain",
-                100.0 * frictionless.strain(),
-                100.0 * strain,
-                "%",
-            ),
-        ];
-        if let ToolShape::Cylinder { radius, .. } = self.scene.tool.shape {
-            // A rounded edge leaves the ramp for its corner before the arm is fully bent: there the
-            // bottom of the edge is still r (1 - cos a) above the height of its contact. The bent
-            // arm has turned the ramp by its slope at the end, 3 y / (2 L).
-            let alpha = hook.lead_angle_deg.to_radians();
-            let bent = hook.undercut - radius * (1.0 - alpha.cos());
-            if bent > 0.0 {
-                let across = frictionless.deflection_force(young_modulus) * bent / hook.undercut;
-                let force = across * (alpha + 1.5 * bent / hook.length).tan();
-                compared.push(row("mating force of a rounded edge", force, peak, "N"));
-            }
-        }
-        Some(Handbook {
-            name: "cantilever snap hook without friction: P = (b h²/6) E ε/L, ε = 1.5 h y/L², \
-                   W = P tan α; a rounded edge of radius r leaves the ramp at y - r (1 - cos α), with the ramp \
-                   turned by the arm's slope 3 y/(2 L)"
-                .to_owned(),
-            rows: compared,
-            curve: frictionless
-                .curve(young_modulus)
-                .iter()
-                .map(|(travel, force)| (travel + touch, *force))
-                .collect(),
-        })
     }
 }
 

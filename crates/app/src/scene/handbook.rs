@@ -1,163 +1,108 @@
-//! The snap-fit handbooks' cantilever hook: what an engineer would compute by hand.
-//!
-//! ```text
-//! ε = 1.5 h y / L²          strain at the root when the arm is bent by y
-//! P = (b h² / 6) E ε / L    force that bends it so
-//! W = P (μ + tan α) / (1 − μ tan α)    force along the insertion, on a ramp of angle α
-//! ```
-//! L length, h thickness, b width, y undercut, μ friction coefficient; beam theory, so a few per
-//! cent off for stubby arms (L/h below about 10), and no elasticity of the root.
-//!
-//! Source: Covestro (formerly Bayer MaterialScience), "Snap-Fit Joints for Plastics: A Design
-//! Guide", cantilever snap joints of rectangular constant cross-section.
+//! What an engineer would compute by hand, beside what was computed: formulas of the snap-fit
+//! handbooks and of the textbooks behind them, one file for each kind of joint.
 
-/// Dimensions of a plain cantilever hook.
+mod annular;
+mod cantilever;
+mod ring;
+
+pub use annular::Annular;
+pub use cantilever::{Cantilever, Ramp};
+pub use ring::Ring;
+
+use super::Material;
+
+/// A joint for which there is a formula.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Handbook {
-    /// Root to catch, m, > 0.
-    pub length: f64,
-    /// In the bending direction, m, > 0.
-    pub thickness: f64,
-    /// m, > 0.
-    pub width: f64,
-    /// Deflection that lets the catch pass, m, > 0.
-    pub undercut: f64,
-    /// Ramp to the direction of insertion, degrees, in (0, 90).
-    pub lead_angle_deg: f64,
-    /// Coulomb's coefficient, >= 0, with `friction tan(lead_angle) < 1` (else the ramp locks).
-    pub friction: f64,
+pub enum Handbook {
+    /// One or several straight arms.
+    Cantilever(Cantilever),
+    /// A round wall that a bead widens.
+    Annular(Annular),
+    /// A C-shaped ring that a round bar opens.
+    Ring(Ring),
+}
+
+/// The formulas' answer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Prediction {
+    /// What it is and, after `: `, how it is computed.
+    pub name: String,
+    /// Numbers, each to be compared with one that was computed.
+    pub rows: Vec<Predicted>,
+    /// Force over travel from the first touch on, as (m, N).
+    pub curve: Vec<(f64, f64)>,
+}
+
+/// One number of the answer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Predicted {
+    /// What it is called.
+    pub label: &'static str,
+    /// What it is to be compared with.
+    pub what: Measured,
+    /// In N, or 1 for a strain.
+    pub value: f64,
+}
+
+/// What a formula's number is the same as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Measured {
+    /// The largest force that resists the insertion.
+    Insertion,
+    /// The largest force that resists the removal.
+    Removal,
+    /// The largest force across the insertion.
+    Across,
+    /// The largest principal strain.
+    Strain,
 }
 
 impl Handbook {
-    /// Largest strain when the arm is bent by the undercut.
-    pub fn strain(&self) -> f64 {
-        1.5 * self.thickness * self.undercut / (self.length * self.length)
-    }
-
-    /// Force across the arm that bends it by the undercut, N. `young_modulus` in Pa; handbooks
-    /// take the secant modulus at the strain.
-    pub fn deflection_force(&self, young_modulus: f64) -> f64 {
-        bending_force(
-            self.width,
-            self.thickness,
-            self.length,
-            young_modulus,
-            self.strain(),
-        )
-    }
-
-    /// Peak force along the insertion, N, >= 0.
-    pub fn mating_force(&self, young_modulus: f64) -> f64 {
-        on_ramp(
-            self.deflection_force(young_modulus),
-            self.lead_angle_deg,
-            self.friction,
-        )
-    }
-
-    /// Travel from first touch to the undercut along the ramp, m.
-    pub fn ramp_travel(&self) -> f64 {
-        self.undercut / self.lead_angle_deg.to_radians().tan()
-    }
-
-    /// Force along the insertion at a travel from first touch on: grows linearly along the ramp,
-    /// then zero (frictionless top). N.
-    pub fn force_at(&self, travel: f64, young_modulus: f64) -> f64 {
-        let ramp = self.ramp_travel();
-        if travel > 0.0 && travel <= ramp {
-            self.mating_force(young_modulus) * travel / ramp
-        } else {
-            0.0
+    /// What the formulas say of a part of this material, without friction.
+    pub fn predict(&self, material: &Material) -> Prediction {
+        match self {
+            Self::Cantilever(arm) => arm.predict(material.young_modulus),
+            Self::Annular(cap) => cap.predict(material.young_modulus, material.poisson_ratio),
+            Self::Ring(ring) => ring.predict(material.young_modulus),
         }
     }
-
-    /// The force-travel curve's corners as (travel from first touch in m, force in N): nothing
-    /// before the touch, a straight rise, the fall at the edge, and as much again of nothing.
-    pub fn curve(&self, young_modulus: f64) -> [(f64, f64); 4] {
-        let (ramp, peak) = (self.ramp_travel(), self.mating_force(young_modulus));
-        [(0.0, 0.0), (ramp, peak), (ramp, 0.0), (2.0 * ramp, 0.0)]
-    }
-
-    /// Whether friction keeps the catch from sliding up the ramp however hard it is pushed.
-    pub fn is_locked(&self) -> bool {
-        self.friction * self.lead_angle_deg.to_radians().tan() >= 1.0
-    }
 }
 
-fn bending_force(width: f64, thickness: f64, length: f64, modulus: f64, strain: f64) -> f64 {
-    width * thickness * thickness / 6.0 * modulus * strain / length
-}
-
-fn on_ramp(force: f64, angle_deg: f64, friction: f64) -> f64 {
-    let slope = angle_deg.to_radians().tan();
-    force * (friction + slope) / (1.0 - friction * slope)
+/// Where the force on a ramp that ends in a round edge is largest, as (deflection in m, angle of
+/// the contact in rad).
+///
+/// On the round the contact's angle falls from the ramp's α to 0, while the deflection grows as
+/// ```text
+/// y = u − r (1 − cos a)
+/// ```
+/// to the whole undercut u. With a stiffness that does not change, the force along the insertion is
+/// y tan a up to a factor, which is largest at cos³ a = 1 − u/r, or where the ramp ends if that is
+/// less steep. `None`: the round is so large that it touches the ramp nowhere (y <= 0).
+fn leaves_ramp(undercut: f64, edge_radius: f64, lead: f64) -> Option<(f64, f64)> {
+    let angle = if undercut < edge_radius {
+        (1.0 - undercut / edge_radius).cbrt().acos().min(lead)
+    } else {
+        lead
+    };
+    let deflection = undercut - edge_radius * (1.0 - angle.cos());
+    (deflection > 0.0).then_some((deflection, angle))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const HOOK: Handbook = Handbook {
-        length: 0.02,
-        thickness: 0.002,
-        width: 0.006,
-        undercut: 0.001,
-        lead_angle_deg: 30.0,
-        friction: 0.25,
-    };
-
-    /// The design guide's example of a polycarbonate hook that tapers to half its thickness:
-    /// L 19, b 9.5, h 3.28 mm, ε 2 %, secant modulus 1815 MPa, α 30°, μ 0.6: P 32.5 N, W 58.5 N.
-    /// The guide rounds to three digits, hence 0.5 %.
+    /// Against a search: undercut 1, radii below and above what moves the peak onto the round.
     #[test]
-    fn forces_match_the_design_guides_example() {
-        let force = bending_force(9.5e-3, 3.28e-3, 19e-3, 1815e6, 0.02);
-        assert!((force / 32.5 - 1.0).abs() < 5e-3, "{force}");
-        let mating = on_ramp(force, 30.0, 0.6);
-        assert!((mating / 58.5 - 1.0).abs() < 5e-3, "{mating}");
-    }
-
-    /// Beam theory: P = 3 E I y / L³ with I = b h³/12, and ε = M (h/2) / (E I) with M = P L.
-    #[test]
-    fn formulas_are_those_of_the_beam() {
-        let (modulus, h) = (1.3e9, HOOK.thickness);
-        let inertia = HOOK.width * h.powi(3) / 12.0;
-        let force = 3.0 * modulus * inertia * HOOK.undercut / HOOK.length.powi(3);
-        assert!((HOOK.deflection_force(modulus) / force - 1.0).abs() < 1e-12);
-        let strain = force * HOOK.length * h / 2.0 / (modulus * inertia);
-        assert!((HOOK.strain() / strain - 1.0).abs() < 1e-12);
-    }
-
-    /// Without friction the work along the ramp is the energy of the bent arm: ½ W s = ½ P y.
-    #[test]
-    fn curve_without_friction_conserves_energy() {
-        let hook = Handbook {
-            friction: 0.0,
-            ..HOOK
-        };
-        let work = 0.5 * hook.mating_force(1.3e9) * hook.ramp_travel();
-        let energy = 0.5 * hook.deflection_force(1.3e9) * hook.undercut;
-        assert!((work / energy - 1.0).abs() < 1e-12, "{work} {energy}");
-    }
-
-    #[test]
-    fn curve_is_zero_outside_the_ramp_and_linear_on_it() {
-        let (ramp, peak) = (HOOK.ramp_travel(), HOOK.mating_force(1.3e9));
-        assert_eq!(HOOK.force_at(-1e-6, 1.3e9), 0.0);
-        assert_eq!(HOOK.force_at(1.01 * ramp, 1.3e9), 0.0);
-        assert!((HOOK.force_at(0.25 * ramp, 1.3e9) / peak - 0.25).abs() < 1e-12);
-        assert_eq!(HOOK.curve(1.3e9)[1], (ramp, peak));
-    }
-
-    #[test]
-    fn steep_rough_ramp_is_locked() {
-        assert!(!HOOK.is_locked());
-        assert!(
-            Handbook {
-                lead_angle_deg: 80.0,
-                ..HOOK
-            }
-            .is_locked()
-        );
+    fn peak_on_a_round_edge_is_where_a_search_finds_it() {
+        for (radius, lead_deg) in [(0.3, 30.0f64), (2.0, 30.0), (5.0, 45.0), (20.0, 45.0)] {
+            let lead = lead_deg.to_radians();
+            let best = (0..=100_000)
+                .map(|i| lead * f64::from(i) / 1e5)
+                .map(|a| (1.0 - radius * (1.0 - a.cos())) * a.tan())
+                .fold(0.0, f64::max);
+            let (y, a) = leaves_ramp(1.0, radius, lead).unwrap();
+            assert!((y * a.tan() / best - 1.0).abs() < 1e-8, "{radius}");
+        }
     }
 }

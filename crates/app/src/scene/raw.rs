@@ -11,6 +11,7 @@ use serde::de::value::MapAccessDeserializer;
 use serde::de::{self, Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 
 mod accuracy;
+mod handbook;
 
 use super::error::{SceneError, line_of, plain, suggestion};
 use super::{DeviceModel, Handle, QuadratureRule, Start, Units};
@@ -18,6 +19,7 @@ pub(super) use accuracy::{
     AccuracyKeys, AccuracyRaw, AdaptiveKeys, AdaptiveRaw, IterationsRaw, MethodRaw, MultiplyRaw,
     MultiplyScalarRaw, PresetRaw, RatesRaw, ScalarRaw, ToolFeaturesRaw,
 };
+pub(super) use handbook::{HandbookRaw, KindRaw};
 
 /// Values of keys that are not written.
 pub(super) mod default {
@@ -143,9 +145,10 @@ pub(super) struct SceneRaw {
     /// Which results are written.
     #[serde(default)]
     pub(super) output: OutputRaw,
-    /// Dimensions of a plain cantilever hook, for a comparison with the snap-fit handbooks.
-    /// Leave the section out for any other part.
-    pub(super) handbook: Option<HandbookRaw>,
+    /// Dimensions of a joint for which there is a formula, for a comparison with the snap-fit
+    /// handbooks: force, removal and strain by hand stand beside the computed ones. Leave the
+    /// section out for any other part.
+    pub(super) handbook: Option<At<HandbookRaw>>,
 }
 
 #[derive(Debug, serde::Deserialize, JsonSchema)]
@@ -566,30 +569,6 @@ pub(super) struct OutputRaw {
     /// Write the session as MCAP, for replay and for Foxglove.
     #[schemars(extend("default" = true))]
     pub(super) mcap: Option<bool>,
-}
-
-#[derive(Debug, serde::Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(super) struct HandbookRaw {
-    /// Length of the arm from its root to the catch, above 0.
-    #[schemars(extend("x-quantity" = "length"))]
-    pub(super) length: At<f64>,
-    /// Thickness of the arm in the bending direction, above 0.
-    #[schemars(extend("x-quantity" = "length"))]
-    pub(super) thickness: At<f64>,
-    /// Width of the arm, above 0.
-    #[schemars(extend("x-quantity" = "length"))]
-    pub(super) width: At<f64>,
-    /// Undercut: how far the arm must bend to pass, above 0.
-    #[schemars(extend("x-quantity" = "length"))]
-    pub(super) undercut: At<f64>,
-    /// Angle of the lead-in ramp to the direction of insertion, above 0 and below 90.
-    #[schemars(extend("x-quantity" = "angle"))]
-    pub(super) lead_angle_deg: At<f64>,
-    /// Coulomb's coefficient on the ramp, at least 0; 0 compares with this program, which
-    /// simulates none.
-    #[schemars(extend("x-quantity" = "number"))]
-    pub(super) friction: At<f64>,
 }
 
 /// Reads the text; what does not fit the keys above is an error with its line.

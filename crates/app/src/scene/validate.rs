@@ -1,6 +1,7 @@
 //! From keys as written to a scene that makes sense, in SI.
 
 mod accuracy;
+mod handbook;
 
 use std::path::{Path, PathBuf};
 
@@ -11,8 +12,8 @@ use super::error::{SceneError, line_of, plain};
 use super::raw::{self, At, EffectRaw, ShapeRaw, Vector, default};
 use super::units::{Quantity, to_si};
 use super::{
-    Coupling, Device, EffectChoice, Effects, FieldOf, Fixed, GroupName, Hand, Handbook, Material,
-    Output, Part, Scene, Tool, ToolShape, Units,
+    Coupling, Device, EffectChoice, Effects, FieldOf, Fixed, GroupName, Hand, Material, Output,
+    Part, Scene, Tool, ToolShape, Units,
 };
 
 /// Servo periods in one run: 10 000 s at 1 kHz. More is a slip of the units, and would fill disks.
@@ -29,6 +30,11 @@ pub(super) fn scene(raw: raw::SceneRaw, source: String, path: &Path) -> Result<S
         raw.units,
     );
     let device = check.device(&raw.device)?;
+    let part = check.part(raw.part, &raw.accuracy.0)?;
+    let handbook = raw
+        .handbook
+        .map(|handbook| check.handbook(&handbook, &raw.tool.value, &part.material))
+        .transpose()?;
     let scene = Scene {
         title: raw.title.unwrap_or_else(|| {
             path.file_stem()
@@ -36,7 +42,8 @@ pub(super) fn scene(raw: raw::SceneRaw, source: String, path: &Path) -> Result<S
         }),
         units,
         length_scale: to_si(units, Quantity::Length),
-        part: check.part(raw.part, &raw.accuracy.0)?,
+        part,
+        handbook,
         tool: check.tool(&raw.tool)?,
         handle: raw.holds.handle,
         hand: check.hand(&raw.hand, &device)?,
@@ -45,10 +52,6 @@ pub(super) fn scene(raw: raw::SceneRaw, source: String, path: &Path) -> Result<S
         device,
         effects: check.effects(&raw.effects)?,
         output: check.output(&raw.output)?,
-        handbook: raw
-            .handbook
-            .map(|handbook| check.handbook(&handbook))
-            .transpose()?,
         path: path.to_path_buf(),
         source: String::new(),
     };
@@ -598,43 +601,5 @@ impl Check<'_> {
             vtu: raw.vtu.unwrap_or(true),
             mcap: raw.mcap.unwrap_or(true),
         })
-    }
-
-    fn handbook(&self, raw: &raw::HandbookRaw) -> Result<Handbook, SceneError> {
-        let length = |key, at| self.number(key, at, Quantity::Length, Range::Positive);
-        let angle = &raw.lead_angle_deg;
-        let friction = &raw.friction;
-        let handbook = Handbook {
-            length: length("length", &raw.length)?,
-            thickness: length("thickness", &raw.thickness)?,
-            width: length("width", &raw.width)?,
-            undercut: length("undercut", &raw.undercut)?,
-            lead_angle_deg: self.number(
-                "lead_angle_deg",
-                angle,
-                Quantity::Angle,
-                Range::Positive,
-            )?,
-            friction: self.number("friction", friction, Quantity::Number, Range::NotNegative)?,
-        };
-        if handbook.lead_angle_deg >= 90.0 {
-            let what = format!(
-                "lead_angle_deg {} must be below 90",
-                handbook.lead_angle_deg
-            );
-            return Err(self.error(angle.offset, what, "ramps have 20 to 45"));
-        }
-        if handbook.is_locked() {
-            let what = format!(
-                "friction {} locks a ramp of {} degrees",
-                handbook.friction, handbook.lead_angle_deg
-            );
-            return Err(self.error(
-                friction.offset,
-                what,
-                "friction times tan(lead angle) must be below 1",
-            ));
-        }
-        Ok(handbook)
     }
 }

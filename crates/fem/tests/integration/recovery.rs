@@ -14,8 +14,11 @@ fn worst(a: &Tensor, b: &Tensor) -> f64 {
     }))
 }
 
+/// A vector or a tensor at each place.
+type Field<T> = Box<dyn Fn([f64; 3]) -> T>;
+
 /// A displacement of degree p, and its strain.
-fn polynomial(degree: i32) -> (impl Fn([f64; 3]) -> [f64; 3], impl Fn([f64; 3]) -> Tensor) {
+fn polynomial(degree: i32) -> (Field<[f64; 3]>, Field<Tensor>) {
     const A: [[f64; 3]; 3] = [[0.3, -0.7, 0.4], [0.9, 0.2, -0.5], [-0.1, 0.6, 0.8]];
     const B: [[f64; 3]; 3] = [[1.0, 0.2, -0.4], [-0.3, 0.8, 0.5], [0.6, -0.9, 0.1]];
     let along = |d: [f64; 3], x: [f64; 3]| 0.2 + d[0] * x[0] + d[1] * x[1] + d[2] * x[2];
@@ -41,7 +44,7 @@ fn polynomial(degree: i32) -> (impl Fn([f64; 3]) -> [f64; 3], impl Fn([f64; 3]) 
         });
         fem::stress::strain(&h)
     };
-    (u, strain)
+    (Box::new(u), Box::new(strain))
 }
 
 /// Strains of degree p - 1 are those of a displacement that the elements hold exactly: nothing may be lost, at vertices,

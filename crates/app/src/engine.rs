@@ -413,9 +413,11 @@ impl Engine {
             report.passes += 1;
             let change = self.pass(&mut tool_pose, target, report);
             // What further passes would change: a geometric series, twice over. Only once all that moves is far
-            // smaller than the distance at which nodes get a plane, so that no other node can come in.
+            // smaller than the distance at which nodes get a plane, so that no other node can come in. The first pass
+            // has none before it, so that nothing is known of how passes shrink.
             let ratio = change / change_before;
-            let is_steady = ratio < STEADY && change < 0.01 * self.settings.near_distance;
+            let is_steady =
+                report.passes > 1 && ratio < STEADY && change < 0.01 * self.settings.near_distance;
             let left = 2.0 * change * ratio / (1.0 - ratio);
             if change <= tolerance || (is_steady && left <= tolerance) {
                 report.converged = true;

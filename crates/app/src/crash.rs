@@ -3,6 +3,7 @@
 //! Unwinding drops what was begun: the folder beside the result vanishes (see `output`), the device is released.
 
 use std::any::Any;
+use std::cell::Cell;
 use std::io::Write;
 use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -19,6 +20,11 @@ static GUARDED: AtomicUsize = AtomicUsize::new(0);
 
 /// What panicked since the guard was put up, on whatever thread.
 static KEPT: Mutex<Vec<Kept>> = Mutex::new(Vec::new());
+
+thread_local! {
+    /// Whether a fault was told where it was caught, so that [`guard`] need not.
+    static TOLD: Cell<bool> = const { Cell::new(false) };
+}
 
 /// A panic as the hook saw it.
 struct Kept {
@@ -61,9 +67,11 @@ pub fn guard(err: &mut dyn Write, work: impl FnOnce(&mut dyn Write) -> u8) -> u8
     if GUARDED.fetch_add(1, Ordering::SeqCst) == 0 {
         kept().clear();
     }
+    TOLD.set(false);
     let outcome = catch_unwind(AssertUnwindSafe(|| work(&mut *err)));
     GUARDED.fetch_sub(1, Ordering::SeqCst);
     let message = match &outcome {
+        Ok(EXIT_CODE) if TOLD.take() => return EXIT_CODE,
         Ok(EXIT_CODE) => None,
         Ok(code) => return *code,
         Err(payload) => Some(message_of(payload.as_ref())),
@@ -73,8 +81,37 @@ pub fn guard(err: &mut dyn Write, work: impl FnOnce(&mut dyn Write) -> u8) -> u8
     EXIT_CODE
 }
 
+/// Does one of several works, of which the others go on where it panics. The command then ends with [`EXIT_CODE`] and
+/// shows the line itself.
+///
+/// # Errors
+/// What is to be told of a panic: what, its place, and where to report it.
+pub(crate) fn catch<T>(work: impl FnOnce() -> T) -> Result<T, String> {
+    catch_unwind(AssertUnwindSafe(work)).map_err(|payload| {
+        TOLD.set(true);
+        let message = message_of(payload.as_ref());
+        let fault = fault(Some(message.clone()));
+        // Told: there is room for what comes next.
+        kept().retain(|k| k.message != message);
+        format!(
+            "{fault}; please report this line with the files it is about to {}",
+            tracker()
+        )
+    })
+}
+
 /// The one line. `message`: of the panic that ended the command, if it got that far.
 fn line(message: Option<String>) -> String {
+    format!(
+        "snapin: {}; nothing was written and earlier results are untouched; please report this line with the scene \
+         and its mesh to {}",
+        fault(message),
+        tracker()
+    )
+}
+
+/// What happened and where.
+fn fault(message: Option<String>) -> String {
     let kept = kept();
     // Another thread's may have been dealt with; the one that ended the command has its message.
     let same = kept
@@ -85,10 +122,8 @@ fn line(message: Option<String>) -> String {
         .or_else(|| same.map(|k| k.message.clone()))
         .unwrap_or_else(|| "a thread ended".to_owned());
     format!(
-        "snapin: a fault of the program, not of your input: {what} ({place}, version {}); nothing was written and \
-         earlier results are untouched; please report this line with the scene and its mesh to {}",
-        env!("CARGO_PKG_VERSION"),
-        tracker()
+        "a fault of the program, not of your input: {what} ({place}, version {})",
+        env!("CARGO_PKG_VERSION")
     )
 }
 
@@ -160,6 +195,27 @@ mod tests {
             text.contains("two lines (") && text.contains("crash.rs:"),
             "{text}"
         );
+
+        // One of several works: its line is for the command to show, and the next one is done.
+        let mut err = Vec::new();
+        let mut lines = Vec::new();
+        let code = guard(&mut err, |_| {
+            for k in 0..20 {
+                lines.push(catch(|| assert!(k % 2 == 0, "odd {k}")));
+            }
+            EXIT_CODE
+        });
+        assert_eq!((code, err.len()), (EXIT_CODE, 0));
+        for (k, line) in lines.iter().enumerate() {
+            match line {
+                Ok(()) => assert_eq!(k % 2, 0),
+                Err(line) => {
+                    let is_whole =
+                        line.contains(&format!("odd {k} (")) && line.contains("crash.rs:");
+                    assert!(is_whole && line.contains("report this line"), "{line}");
+                }
+            }
+        }
 
         // What goes well says nothing.
         let mut err = Vec::new();

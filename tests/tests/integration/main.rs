@@ -5,6 +5,7 @@
 mod accuracy;
 mod architecture;
 mod bad_input;
+mod broken_cases;
 mod cache;
 mod contact_cases;
 mod docs;

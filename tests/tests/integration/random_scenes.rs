@@ -13,7 +13,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use snapin_tests::brick::{Brick, Random, Takes};
 
 /// Seeds to try, from the environment where it names more.
-fn seeds(n: u64) -> std::ops::Range<u64> {
+pub(crate) fn seeds(n: u64) -> std::ops::Range<u64> {
     let of = |name: &str| std::env::var(name).ok().and_then(|text| text.parse().ok());
     let first = of("SNAPIN_FIRST_SEED").unwrap_or(0);
     first..first + of("SNAPIN_SEEDS").unwrap_or(n)

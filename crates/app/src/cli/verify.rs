@@ -6,10 +6,10 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{json_text, print};
-use crate::Error;
 use crate::leftovers::write_beside;
 use crate::progress::Ui;
 use crate::study::verify::{CaseResult, Status, find_cases, run_case, to_json};
+use crate::{Error, crash};
 
 #[derive(Debug, Args)]
 pub(super) struct VerifyArgs {
@@ -71,7 +71,11 @@ pub(super) fn run(args: &VerifyArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result
             &format!("{passed} of {} cases within tolerance\n", results.len()),
         )?;
     }
-    Ok(u8::from(results.iter().any(|r| r.status != Status::Ok)))
+    Ok(if results.iter().any(|r| r.status == Status::Fault) {
+        crash::EXIT_CODE
+    } else {
+        u8::from(results.iter().any(|r| r.status != Status::Ok))
+    })
 }
 
 fn table(result: &CaseResult) -> String {

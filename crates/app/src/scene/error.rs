@@ -97,6 +97,11 @@ pub enum SceneError {
 }
 
 impl SceneError {
+    /// The mend for a misspelt name in other files than scenes, in the same words.
+    pub(crate) fn mend_of(name: &str, known: &[&str]) -> String {
+        suggestion(name, known)
+    }
+
     /// The line it is about, counted from 1, if the file could be read.
     pub fn line(&self) -> Option<usize> {
         match self {

@@ -1,137 +1,18 @@
 //! `case.toml` and `expected.json` of a reference case.
 
+mod raw;
+
 use std::path::{Path, PathBuf};
 
 use fem::{Material, Mesh, Quadrature, Supports};
-use serde::Deserialize;
 use serde_json::Value;
 
-use super::Failure;
+use super::files::{text, wrong};
+use super::schema::nearest;
+use super::{Failure, expected};
 use crate::engine::ContactIterations;
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub(super) enum Kind {
-    Patch,
-    Static,
-    Convergence,
-    Contact,
-    Error,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(untagged)]
-enum OneOrMore<T> {
-    One(T),
-    More(Vec<T>),
-}
-
-impl<T> OneOrMore<T> {
-    fn as_slice(&self) -> &[T] {
-        match self {
-            Self::One(x) => std::slice::from_ref(x),
-            Self::More(list) => list,
-        }
-    }
-}
-
-#[derive(Debug, Deserialize)]
-struct RawMaterial {
-    group: Option<String>,
-    #[serde(rename = "E")]
-    young_modulus: f64,
-    nu: f64,
-}
-
-#[derive(Debug, Deserialize)]
-struct RawFixed {
-    group: String,
-    components: Option<Vec<String>>,
-}
-
-/// A load on a group of faces.
-#[derive(Debug, Deserialize)]
-pub(super) struct Load {
-    pub(super) group: String,
-    /// N, total, as a uniform dead traction.
-    pub(super) force: Option<[f64; 3]>,
-    /// Pa, along the normal of the undeformed face, into the body.
-    pub(super) pressure: Option<f64>,
-}
-
-#[derive(Debug, Deserialize)]
-struct RawPrescribed {
-    group: String,
-}
-
-/// Polynomial displacement field: rows `[coefficient, i, j, k]`.
-#[derive(Debug, Deserialize)]
-pub(super) struct PolynomialField {
-    scale: f64,
-    length: f64,
-    x: Vec<[f64; 4]>,
-    y: Vec<[f64; 4]>,
-    z: Vec<[f64; 4]>,
-}
-
-/// Exact displacement of a thick cylinder, u = (A + B / r²) (x, y, 0).
-#[derive(Debug, Deserialize)]
-#[allow(non_snake_case)]
-pub(super) struct LameField {
-    A: f64,
-    B: f64,
-}
-
-#[derive(Debug, Deserialize)]
-struct RawContact {
-    group: String,
-    friction: Option<f64>,
-}
-
-#[derive(Debug, Deserialize)]
-pub(super) struct RawTool {
-    pub(super) shape: String,
-    pub(super) radius: Option<f64>,
-    pub(super) half_length: Option<f64>,
-    pub(super) half_extents: Option<[f64; 3]>,
-}
-
-/// Pose of a tool, in the keys that suit its shape.
-#[derive(Clone, Debug, Deserialize)]
-pub(super) struct RawPose {
-    #[serde(alias = "centre", alias = "center", alias = "point")]
-    pub(super) axis_point: [f64; 3],
-    #[serde(alias = "normal")]
-    pub(super) axis_direction: Option<[f64; 3]>,
-}
-
-#[derive(Debug, Deserialize)]
-struct RawHandbook {
-    undercut: Option<f64>,
-}
-
-#[derive(Debug, Deserialize)]
-struct RawCase {
-    kind: Kind,
-    mesh: Option<String>,
-    meshes: Option<Vec<String>>,
-    order: Option<u8>,
-    geometry: Option<String>,
-    units: Option<String>,
-    contact_iterations: Option<toml::Value>,
-    material: OneOrMore<RawMaterial>,
-    fixed: Option<OneOrMore<RawFixed>>,
-    #[serde(default)]
-    load: Vec<Load>,
-    prescribed: Option<RawPrescribed>,
-    field: Option<PolynomialField>,
-    lame: Option<LameField>,
-    contact: Option<RawContact>,
-    tool: Option<RawTool>,
-    #[serde(default)]
-    pose: Vec<RawPose>,
-    handbook: Option<RawHandbook>,
-}
+pub(super) use raw::{Kind, Load, RawPose, RawTool};
+use raw::{LameField, OneOrMore, PolynomialField, RawCase, RawFixed, RawMaterial};
 
 /// A prescribed displacement.
 #[derive(Debug)]
@@ -183,95 +64,56 @@ pub(super) struct Case {
 }
 
 impl Case {
+    /// Reads both files and checks all that can be checked without the mesh.
     pub(super) fn read(dir: &Path) -> Result<Self, Failure> {
         let path = dir.join("case.toml");
-        let wrong = |what: String| Failure::Error(format!("{}: {what}", path.display()));
-        let text = std::fs::read_to_string(&path).map_err(|e| wrong(e.to_string()))?;
-        let raw: RawCase = toml::from_str(&text).map_err(|e| wrong(e.to_string()))?;
-
-        let expected_path = dir.join("expected.json");
-        let in_expected =
-            |what: String| Failure::Error(format!("{}: {what}", expected_path.display()));
-        let text =
-            std::fs::read_to_string(&expected_path).map_err(|e| in_expected(e.to_string()))?;
-        let expected: Value =
-            serde_json::from_str(&text).map_err(|e| in_expected(e.to_string()))?;
-
-        if let Some(units) = raw.units.as_deref().filter(|u| *u != "SI") {
+        if dir.join("problem.json").exists() {
+            return Err(wrong(
+                dir,
+                "holds case.toml and problem.json; give each case a folder of its own",
+            ));
+        }
+        let raw = RawCase::parse(&text(&path)?, &path)?;
+        let not_in_si = raw.units.as_deref().filter(|u| *u != "SI");
+        if let Some(units) = not_in_si {
             return Err(Failure::NotSupported(format!(
                 "units {units:?}; cases are in SI"
             )));
         }
-        if let Some(friction) = raw
-            .contact
-            .as_ref()
-            .and_then(|c| c.friction)
-            .filter(|f| *f != 0.0)
-        {
+        let friction = raw.contact.as_ref().and_then(|c| c.friction);
+        if let Some(friction) = friction.filter(|f| *f != 0.0) {
             return Err(Failure::NotSupported(format!(
                 "friction {friction}; contact is frictionless"
             )));
         }
-        let iterations = match &raw.contact_iterations {
-            None => ContactIterations::Converged,
-            Some(toml::Value::String(s)) if s == "converged" => ContactIterations::Converged,
-            Some(toml::Value::Integer(n @ 1..=50)) => ContactIterations::Fixed(*n as u32),
-            Some(other) => {
-                return Err(Failure::NotSupported(format!(
-                    "contact_iterations = {other}"
-                )));
-            }
-        };
-        let mut materials = Vec::new();
-        for m in raw.material.as_slice() {
-            let material =
-                Material::new(m.young_modulus, m.nu).map_err(|e| wrong(e.to_string()))?;
-            materials.push((m.group.clone(), material));
-        }
-        let mut fixed = Vec::new();
-        for f in raw.fixed.as_ref().map_or(&[][..], OneOrMore::as_slice) {
-            fixed.push((
-                f.group.clone(),
-                components(f.components.as_deref()).map_err(&wrong)?,
-            ));
-        }
-        let meshes = match (raw.mesh, raw.meshes) {
-            (Some(mesh), None) => vec![mesh],
-            (None, Some(meshes)) if !meshes.is_empty() => meshes,
-            _ => return Err(wrong("needs either `mesh` or a list `meshes`".to_owned())),
-        };
-        let field = match (raw.field, raw.lame) {
-            (Some(field), _) => Some(Field::Polynomial(field)),
-            (None, Some(lame)) => Some(Field::Lame(lame)),
-            (None, None) => None,
-        };
-        let prescribed = match (raw.prescribed, field) {
-            (Some(p), Some(field)) => Some((p.group, field)),
-            (Some(_), None) => {
-                return Err(wrong("[prescribed] needs [field] or [lame]".to_owned()));
-            }
-            (None, _) => None,
-        };
         let curved = match raw.geometry.as_deref() {
             None | Some("straight") => false,
             Some("curved") => true,
             Some(other) => return Err(Failure::NotSupported(format!("geometry {other:?}"))),
         };
+        let in_case = |what: String| wrong(&path, &what);
+        check_numbers(&raw).map_err(in_case)?;
+        let expected = expected::read(&dir.join("expected.json"), raw.kind)?;
+        if let Some(compare) = &raw.compare {
+            check_compare(&compare.quantities, &expected, raw.kind).map_err(in_case)?;
+        }
+        let undercut = raw.handbook.as_ref().and_then(|h| h.undercut);
         Ok(Self {
             dir: dir.to_path_buf(),
             kind: raw.kind,
-            mesh_paths: meshes.iter().map(|m| dir.join(m)).collect(),
+            mesh_paths: mesh_paths(dir, raw.mesh, raw.meshes).map_err(in_case)?,
             order: raw.order,
             curved,
-            materials,
-            fixed,
+            materials: materials(raw.material.as_slice()).map_err(in_case)?,
+            fixed: fixed(raw.fixed.as_ref()).map_err(in_case)?,
             loads: raw.load,
-            prescribed,
+            prescribed: prescribed(raw.prescribed.map(|p| p.group), raw.field, raw.lame)
+                .map_err(in_case)?,
             contact_group: raw.contact.map(|c| c.group),
             tool: raw.tool,
             poses: raw.pose,
-            iterations,
-            undercut: raw.handbook.and_then(|h| h.undercut),
+            iterations: iterations(raw.contact_iterations.as_ref())?,
+            undercut,
             expected,
         })
     }
@@ -288,15 +130,18 @@ impl Case {
     /// The rule that a quantity was computed with.
     pub(super) fn quadrature(&self, quantity: &Value) -> Result<Quadrature, Failure> {
         match quantity["quadrature"].as_str() {
-            Some("points-4") => Ok(Quadrature::Fast),
-            Some("converged") => Ok(Quadrature::Converged),
-            Some(other) => match other.strip_prefix("degree-").and_then(|n| n.parse().ok()) {
-                Some(degree) => Ok(Quadrature::Degree(degree)),
-                None => Err(Failure::NotSupported(format!("quadrature {other:?}"))),
-            },
-            // Straight elements are exact with the lowest rule.
-            None if self.curved => Ok(Quadrature::Converged),
-            None => Ok(Quadrature::Fast),
+            Some(rule) => expected::quadrature(rule)
+                .map_err(|e| wrong(&self.dir.join("expected.json"), &format!("quadrature: {e}"))),
+            None => Ok(self.own_quadrature()),
+        }
+    }
+
+    /// Where a quantity names no rule: straight elements are exact with the lowest.
+    pub(super) fn own_quadrature(&self) -> Quadrature {
+        if self.curved {
+            Quadrature::Converged
+        } else {
+            Quadrature::Fast
         }
     }
 
@@ -324,7 +169,35 @@ impl Case {
             }
         }
         mesh.check(&supports).map_err(Failure::in_file(path))?;
+        self.check_counts(&mesh, path)?;
         Ok((mesh, supports))
+    }
+
+    /// What the other programs counted in this mesh; another count is another mesh.
+    fn check_counts(&self, mesh: &Mesh, path: &Path) -> Result<(), Failure> {
+        let name = path.file_name().and_then(|name| name.to_str());
+        let listed = self.expected["meshes"].as_array();
+        let described = listed
+            .and_then(|list| list.iter().find(|m| m["mesh"].as_str() == name))
+            .unwrap_or(&self.expected["mesh"]);
+        for (key, count) in [
+            ("nodes", mesh.n_nodes()),
+            ("elements", mesh.n_elements()),
+            ("order", mesh.order as usize),
+        ] {
+            match described[key].as_u64() {
+                Some(expected) if expected != count as u64 => {
+                    return Err(wrong(
+                        path,
+                        &format!(
+                            "{key} {count}, expected.json says {expected}; is it the mesh that the values are of?"
+                        ),
+                    ));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
     }
 
     /// Materials and the one of each element.
@@ -372,6 +245,117 @@ fn no_group(name: &str, path: &Path) -> Failure {
         "{}: has no physical group {name:?}",
         path.display()
     ))
+}
+
+/// TOML has `nan` and `inf`, and neither is a load, a place or a size.
+fn check_numbers(raw: &RawCase) -> Result<(), String> {
+    if let Some(order) = raw.order.filter(|order| !(1..=3).contains(order)) {
+        return Err(format!("order = {order} must be 1, 2 or 3"));
+    }
+    let finite = |what: String, numbers: &[f64]| match numbers.iter().find(|x| !x.is_finite()) {
+        Some(x) => Err(format!("{what}: {x} is no number; give one")),
+        None => Ok(()),
+    };
+    for load in &raw.load {
+        let of = format!("[[load]] on {:?}", load.group);
+        match (load.force, load.pressure) {
+            (Some(force), None) => finite(of, &force)?,
+            (None, Some(pressure)) => finite(of, &[pressure])?,
+            _ => return Err(format!("{of} needs either `force` or `pressure`")),
+        }
+    }
+    for (k, pose) in raw.pose.iter().enumerate() {
+        let of = format!("[[pose]] number {}", k + 1);
+        finite(of.clone(), &pose.axis_point)?;
+        finite(of, &pose.axis_direction.unwrap_or_default())?;
+    }
+    if let Some(undercut) = raw.handbook.as_ref().and_then(|h| h.undercut) {
+        finite("[handbook] undercut".to_owned(), &[undercut])?;
+    }
+    match &raw.field {
+        Some(field) if field.length == 0.0 => Err("[field] length must not be zero".to_owned()),
+        _ => Ok(()),
+    }
+}
+
+/// Each name that is to be compared is that of a quantity, whole or its first part: of one in expected.json, or of one
+/// that is computed in such cases (a list is often that of all cases alike).
+fn check_compare(names: &[String], expected: &Value, kind: Kind) -> Result<(), String> {
+    let quantities = expected["quantities"].as_array();
+    let mut known: Vec<&str> = quantities
+        .into_iter()
+        .flatten()
+        .filter_map(|q| q["name"].as_str())
+        .collect();
+    known.extend(expected::names(kind));
+    let is_there = |name: &String| {
+        known.iter().any(|quantity| {
+            let rest = quantity.strip_prefix(name.as_str());
+            rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+        })
+    };
+    match names.iter().find(|name| !is_there(name)) {
+        Some(name) => Err(format!(
+            "[compare] quantities: {name:?} is no quantity of such a case: {}",
+            nearest(name, &known)
+        )),
+        None => Ok(()),
+    }
+}
+
+fn iterations(raw: Option<&toml::Value>) -> Result<ContactIterations, Failure> {
+    match raw {
+        None => Ok(ContactIterations::Converged),
+        Some(toml::Value::String(s)) if s == "converged" => Ok(ContactIterations::Converged),
+        Some(toml::Value::Integer(n @ 1..=50)) => Ok(ContactIterations::Fixed(*n as u32)),
+        Some(other) => Err(Failure::NotSupported(format!(
+            "contact_iterations = {other}; \"converged\" and 1 to 50 are"
+        ))),
+    }
+}
+
+fn materials(raw: &[RawMaterial]) -> Result<Vec<(Option<String>, Material)>, String> {
+    raw.iter()
+        .map(|m| {
+            let material = Material::new(m.young_modulus, m.nu).map_err(|e| e.to_string())?;
+            Ok((m.group.clone(), material))
+        })
+        .collect()
+}
+
+fn fixed(raw: Option<&OneOrMore<RawFixed>>) -> Result<Vec<(String, [bool; 3])>, String> {
+    raw.map_or(&[][..], OneOrMore::as_slice)
+        .iter()
+        .map(|f| Ok((f.group.clone(), components(f.components.as_deref())?)))
+        .collect()
+}
+
+fn mesh_paths(
+    dir: &Path,
+    mesh: Option<String>,
+    meshes: Option<Vec<String>>,
+) -> Result<Vec<PathBuf>, String> {
+    let names = match (mesh, meshes) {
+        (Some(mesh), None) => vec![mesh],
+        (None, Some(meshes)) if !meshes.is_empty() => meshes,
+        _ => return Err("needs either `mesh` or a list `meshes`".to_owned()),
+    };
+    Ok(names.iter().map(|name| dir.join(name)).collect())
+}
+
+fn prescribed(
+    group: Option<String>,
+    field: Option<PolynomialField>,
+    lame: Option<LameField>,
+) -> Result<Option<(String, Field)>, String> {
+    match (group, field, lame) {
+        (None, None, None) => Ok(None),
+        (Some(group), Some(field), None) => Ok(Some((group, Field::Polynomial(field)))),
+        (Some(group), None, Some(lame)) => Ok(Some((group, Field::Lame(lame)))),
+        (_, Some(_), Some(_)) => Err("[field] and [lame] are two fields; give one".to_owned()),
+        (Some(_), None, None) => Err("[prescribed] needs [field] or [lame]".to_owned()),
+        (None, _, _) => Err("[field] or [lame] without [prescribed], which says where".to_owned()),
+    }
 }
 
 fn components(names: Option<&[String]>) -> Result<[bool; 3], String> {

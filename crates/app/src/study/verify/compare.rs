@@ -21,6 +21,8 @@ pub struct Quantity {
 impl Quantity {
     /// Compares by the tolerance: within if the difference is below `abs`, or below `rel` times
     /// the largest expected entry (of each key, for an object).
+    ///
+    /// A value without a number in it is never within: nothing was compared.
     pub(super) fn compare(
         name: &str,
         computed: Value,
@@ -50,7 +52,7 @@ impl Quantity {
         let mut error_rel: f64 = if pairs.is_empty() { f64::INFINITY } else { 0.0 };
         for (expected, computed, floor) in &pairs {
             match difference(expected, computed) {
-                Some((largest_difference, largest_entry)) => {
+                Some((largest_difference, largest_entry)) if count(expected) > 0 => {
                     let largest_entry = largest_entry.max(*floor);
                     let relative = if largest_difference == 0.0 {
                         0.0
@@ -60,7 +62,7 @@ impl Quantity {
                     error_rel = error_rel.max(relative);
                     within &= largest_difference <= abs.max(rel * largest_entry);
                 }
-                None => {
+                _ => {
                     error_rel = f64::INFINITY;
                     within = false;
                 }
@@ -119,7 +121,7 @@ const LEVER: f64 = 1e-3;
 /// Keys of an object value that are unique and therefore compared; single nodal forces and the
 /// set of active nodes are not (quadratic elements share a face's force unevenly). Maxima are those
 /// over the points of the 4-point rule and over components.
-const COMPARED_KEYS: [&str; 14] = [
+pub(super) const COMPARED_KEYS: [&str; 14] = [
     "force_on_tool_N",
     "torque_on_tool_Nm",
     "sample_displacement_m",
@@ -157,14 +159,30 @@ fn difference(expected: &Value, computed: &Value) -> Option<(f64, f64)> {
             fold(e.iter().zip(c).map(|(e, c)| difference(e, c)))
         }
         (Value::Object(e), Value::Object(c)) => {
-            let keys: Vec<&String> = e
-                .keys()
-                .filter(|k| !k.starts_with("active") && *k != "note")
-                .collect();
+            let keys: Vec<&String> = e.keys().filter(|k| is_compared(k)).collect();
             fold(keys.iter().map(|k| difference(&e[*k], c.get(*k)?)))
         }
         _ => None,
     }
+}
+
+/// Numbers that [`difference`] looks at.
+fn count(expected: &Value) -> usize {
+    match expected {
+        Value::Number(_) => 1,
+        Value::Array(list) => list.iter().map(count).sum(),
+        Value::Object(object) => object
+            .iter()
+            .filter(|(key, _)| is_compared(key))
+            .map(|(_, value)| count(value))
+            .sum(),
+        _ => 0,
+    }
+}
+
+/// The set of active nodes is not unique, and a remark is no number.
+fn is_compared(key: &str) -> bool {
+    !key.starts_with("active") && key != "note"
 }
 
 fn fold(parts: impl Iterator<Item = Option<(f64, f64)>>) -> Option<(f64, f64)> {
@@ -200,5 +218,24 @@ mod tests {
         }
         let contact = json!({"force_on_tool_N": [1.0, 0.0, 0.0]});
         assert!(!Quantity::compare("c", json!({}), &contact, &tolerance).is_within());
+    }
+
+    #[test]
+    fn a_value_without_a_number_is_never_within() {
+        let tolerance = json!({"rel": 0.5});
+        for value in [
+            json!({}),
+            json!([]),
+            json!([[], []]),
+            json!({"12": []}),
+            json!({"note": "nothing"}),
+            json!({"active": [1, 2]}),
+            json!({"sample_displacement_m": {}}),
+            json!({"one_pass_planes_at_rest": {"active_count": 3}}),
+        ] {
+            let q = Quantity::compare("u", value.clone(), &value, &tolerance);
+            assert!(!q.is_within(), "{value}");
+            assert_eq!(q.error_rel, f64::INFINITY);
+        }
     }
 }

@@ -1,6 +1,8 @@
 //! Contact with a rigid tool at given poses, with fixed-point planes and in the paper's single
 //! pass, through the same engine that the hand feels.
 
+mod insertion;
+
 use std::path::Path;
 use std::sync::Arc;
 
@@ -140,7 +142,7 @@ fn compute(case: &Case, quantity: &Value, ready: &Touchable) -> Result<Quantity,
     } else if let Some(index) = pose_index(name, &["lcp.pose"]) {
         rest_problem(ready, &pose(pose_of(case, index)?)?, expected)?
     } else if name.starts_with("insertion.") {
-        insertion(case, ready, quantity)?
+        insertion::run(case, ready, quantity)?
     } else if name == "catch_edge_stiffness" {
         json!(edge_stiffness(&ready.elastic, quantity)?)
     } else if name == "deflection_force_fe" {
@@ -378,49 +380,6 @@ fn rest_problem(ready: &Touchable, pose: &DPose3, expected: &Value) -> Result<Va
     .map_err(|e| Failure::Error(e.to_string()))?;
     let by_row: Vec<&[f64]> = matrix.chunks_exact(m.max(1)).collect();
     Ok(json!({ "nodes": expected["nodes"], "q": q, "M": by_row, "solution_z": z }))
-}
-
-/// The path of the reference's curve, walked in its steps.
-fn insertion(case: &Case, ready: &Touchable, quantity: &Value) -> Result<Value, Failure> {
-    let file = quantity["file"].as_str().ok_or_else(|| {
-        Failure::NotSupported("an insertion without the file of its path".to_owned())
-    })?;
-    let path = case.dir.join(file);
-    let wrong = |e: String| Failure::Error(format!("{}: {e}", path.display()));
-    let text = std::fs::read_to_string(&path).map_err(|e| wrong(e.to_string()))?;
-    let mut lines = text.lines();
-    if lines.next().and_then(|header| header.split(',').next()) != Some("axis_y_m") {
-        return Err(wrong("first column is not axis_y_m".to_owned()));
-    }
-    let heights = lines
-        .filter_map(|line| line.split(',').next())
-        .map(|y| y.trim().parse::<f64>().map_err(|e| wrong(e.to_string())))
-        .collect::<Result<Vec<f64>, _>>()?;
-
-    let mut target = pose(pose_of(case, 1)?)?;
-    let near = 2.0 * stride(ready);
-    let mut walker = engine(ready, case.iterations, near)?;
-    let (mut peak, mut at_peak, mut lowest, mut strain) = (f64::MIN, 0.0, f64::MAX, 0.0f64);
-    for y in heights {
-        target.translation.y = y;
-        let report = walker.step(&target);
-        require_converged(&report)?;
-        let force = report.contact_force_on_tool().y;
-        if force > peak {
-            (peak, at_peak) = (force, y);
-        }
-        lowest = lowest.min(force);
-        if report.contacts > 0 {
-            let u = ready.elastic.factor.solve(&nodal_forces(ready, &walker));
-            strain = strain.max(extremes(case, ready, &u)?.max_principal_strain);
-        }
-    }
-    Ok(json!({
-        "peak_force_N": peak,
-        "axis_y_at_peak_m": at_peak,
-        "min_force_N": lowest,
-        "max_principal_strain": strain,
-    }))
 }
 
 /// Force in -y, spread over the edge by weights, over its work-mean deflection, N/m.

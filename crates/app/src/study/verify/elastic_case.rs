@@ -6,6 +6,7 @@ use fem::{FactoredStiffness, Mesh, Quadrature, Stiffness, Supports};
 use serde_json::{Map, Value, json};
 
 use super::case::{Case, Field};
+use super::files::wrong;
 use super::{Failure, Outcome, Quantity};
 use crate::progress::Ui;
 
@@ -129,8 +130,17 @@ fn solve(case: &Case, path: &Path, quadrature: Quadrature, ui: &Ui<'_>) -> Resul
         Some((group, field)) => {
             let mut prescribed = vec![0.0; 3 * mesh.n_nodes()];
             for &node in case.nodes(mesh, group, path)? {
-                let at = 3 * node as usize;
-                prescribed[at..at + 3].copy_from_slice(&field.at(mesh.nodes[node as usize]));
+                let (at, x) = (3 * node as usize, mesh.nodes[node as usize]);
+                let u = field.at(x);
+                if u.iter().any(|c| !c.is_finite()) {
+                    return Err(wrong(
+                        &case.dir.join("case.toml"),
+                        &format!(
+                            "the prescribed field at {x:?} m is {u:?}, which is no displacement"
+                        ),
+                    ));
+                }
+                prescribed[at..at + 3].copy_from_slice(&u);
             }
             elastic
                 .factor
@@ -146,24 +156,16 @@ fn solve(case: &Case, path: &Path, quadrature: Quadrature, ui: &Ui<'_>) -> Resul
     })
 }
 
-/// Runs a `patch` or `static` case (and an `error` case, which ends before it is solved).
+/// Computes what an `error` case must be refused for, and compares nothing.
+pub(super) fn solve_only(case: &Case, ui: &Ui<'_>) -> Result<(), Failure> {
+    solve(case, &case.mesh_paths[0], case.own_quadrature(), ui).map(|_| ())
+}
+
+/// Runs a `patch` or `static` case.
 pub(super) fn run(case: &Case, ui: &Ui<'_>) -> Outcome {
     let path = &case.mesh_paths[0];
     let mut solved: Vec<Solved> = Vec::new();
     let mut quantities = Vec::new();
-    if case.quantities().next().is_none() {
-        // Nothing to compare, but the case has to be refused if it cannot be computed.
-        solve(
-            case,
-            path,
-            if case.curved {
-                Quadrature::Converged
-            } else {
-                Quadrature::Fast
-            },
-            ui,
-        )?;
-    }
     for quantity in case.quantities() {
         let quadrature = case.quadrature(quantity)?;
         let known = solved
@@ -198,6 +200,12 @@ fn compute(case: &Case, quantity: &Value, solved: &Solved) -> Result<Quantity, F
         }
         elastic.by_tag(expected, u)?
     } else if name == "work_mean_displacement" {
+        if *total_force == 0.0 {
+            return Err(wrong(
+                &case.dir.join("case.toml"),
+                "work_mean_displacement needs a [[load]] with a `force` that is not zero",
+            ));
+        }
         let work: f64 = force.iter().zip(u).map(|(f, u)| f * u).sum();
         json!(work / total_force)
     } else if name == "strain_energy" {
@@ -260,11 +268,7 @@ pub(super) fn run_convergence(case: &Case, ui: &Ui<'_>) -> Outcome {
     let mut energy = Vec::new();
     let mut l2 = Vec::new();
     let mut elements: Vec<f64> = Vec::new();
-    let quadrature = if case.curved {
-        Quadrature::Converged
-    } else {
-        Quadrature::Fast
-    };
+    let quadrature = case.own_quadrature();
     for path in &case.mesh_paths {
         let solved = solve(case, path, quadrature, ui)?;
         let Elastic {

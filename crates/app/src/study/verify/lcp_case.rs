@@ -1,25 +1,52 @@
 //! Linear complementarity problems: `problem.json` with NumPy arrays beside it.
 
 use std::collections::HashSet;
-use std::fs::File;
-use std::io::BufReader;
 use std::path::Path;
 
 use contact::lcp;
 use serde_json::{Value, json};
 
-use super::{Failure, Outcome, Quantity};
+use super::files::{text, wrong};
+use super::schema::{Shape, check};
+use super::{Failure, Outcome, Quantity, npy};
 
 /// What the reference asks: certificate and w always, z where it is unique.
 const CERTIFICATE: f64 = 1e-10;
 const GAP_REL: f64 = 1e-9;
 const FORCE_REL: f64 = 1e-8;
 
+/// Rows of a problem: the arrays of more are not read.
+const ROWS: Shape = Shape::Count(1, 5000);
+
+/// Keys of `problem.json`. Those that only describe are listed in docs/reference-cases.md.
+pub(super) const PROBLEM: Shape = Shape::Object(&[
+    ("name", Shape::Text),
+    ("family", Shape::Text),
+    ("note", Shape::Text),
+    ("m", ROWS),
+    ("symmetric", Shape::Flag),
+    ("outcome", Shape::Choice(&["solution", "no solution"])),
+    ("unique", Shape::Flag),
+    (
+        "steps",
+        Shape::List(&Shape::Object(&[
+            ("m", ROWS),
+            ("active", Shape::Any),
+            ("certificate", Shape::Any),
+        ])),
+    ),
+    ("solvers", Shape::Any),
+    ("certificate", Shape::Any),
+    ("active", Shape::Any),
+    ("agreement_rel", Shape::Any),
+    ("w_agreement_rel", Shape::Any),
+]);
+
 pub(super) fn run(dir: &Path) -> Outcome {
     let path = dir.join("problem.json");
-    let wrong = |e: String| Failure::Error(format!("{}: {e}", path.display()));
-    let text = std::fs::read_to_string(&path).map_err(|e| wrong(e.to_string()))?;
-    let problem: Value = serde_json::from_str(&text).map_err(|e| wrong(e.to_string()))?;
+    let problem: Value =
+        serde_json::from_str(&text(&path)?).map_err(|e| wrong(&path, &e.to_string()))?;
+    check(&problem, &PROBLEM, "").map_err(|e| wrong(&path, &e))?;
     if problem["steps"].is_array() {
         run_sequence(dir, &problem)
     } else {
@@ -66,7 +93,15 @@ fn solve(
 }
 
 fn run_one(dir: &Path, problem: &Value) -> Outcome {
-    let (matrix, q) = (read_matrix(dir, "M.npy")?, read(dir, "q.npy")?);
+    let q = read(dir, "q.npy")?;
+    let matrix = read_matrix(dir, "M.npy", q.len())?;
+    same_length(
+        dir,
+        "q.npy",
+        q.len(),
+        "problem.json (`m`)",
+        problem["m"].as_u64(),
+    )?;
     let answer = solve(
         &matrix,
         &q,
@@ -84,7 +119,7 @@ fn run_one(dir: &Path, problem: &Value) -> Outcome {
     let mut quantities = vec![Quantity::text("outcome", outcome, expected)];
     if expected == "solution" {
         quantities.push(certificate(answer.certificate));
-        let z = read(dir, "z.npy")?;
+        let z = read_forces(dir, "z.npy", q.len())?;
         let m = q.len();
         let w: Vec<f64> = (0..m)
             .map(|i| q[i] + (0..m).map(|j| matrix[j * m + i] * z[j]).sum::<f64>())
@@ -126,22 +161,24 @@ fn certificate(value: f64) -> Quantity {
 }
 
 fn run_sequence(dir: &Path, problem: &Value) -> Outcome {
-    let n_steps = problem["steps"].as_array().map_or(0, Vec::len);
+    let steps = problem["steps"].as_array().map_or(&[][..], Vec::as_slice);
+    if problem["outcome"] == "no solution" {
+        return Err(wrong(
+            &dir.join("problem.json"),
+            "outcome: a sequence of steps is compared by its solutions; give a problem without one a folder of its own",
+        ));
+    }
     let mut active: HashSet<i64> = HashSet::new();
     let mut worst = 0.0f64;
     let mut last = None;
-    for step in 0..n_steps {
-        let matrix = read_matrix(dir, &format!("M-{step:02}.npy"))?;
-        let q = read(dir, &format!("q-{step:02}.npy"))?;
-        let ids = read_ids(dir, &format!("ids-{step:02}.npy"))?;
-        if ids.len() != q.len() {
-            return Err(Failure::Error(format!(
-                "{}: step {step} has {} ids and {} rows",
-                dir.display(),
-                ids.len(),
-                q.len()
-            )));
-        }
+    for (step, described) in steps.iter().enumerate() {
+        let names = ["M", "q", "ids"].map(|name| format!("{name}-{step:02}.npy"));
+        let q = read(dir, &names[1])?;
+        let matrix = read_matrix(dir, &names[0], q.len())?;
+        let ids = read_list::<i64>(dir, &names[2])?;
+        same_length(dir, &names[2], ids.len(), &names[1], Some(q.len() as u64))?;
+        let of_step = format!("problem.json (`m` of step {step})");
+        same_length(dir, &names[1], q.len(), &of_step, described["m"].as_u64())?;
         // The set of rows changes from step to step: the warm start is carried by id.
         let warm: Vec<bool> = ids.iter().map(|id| active.contains(id)).collect();
         let answer = solve(
@@ -165,7 +202,7 @@ fn run_sequence(dir: &Path, problem: &Value) -> Outcome {
     }
     let mut quantities = vec![certificate(worst)];
     if let Some((step, answer)) = last {
-        let z = read(dir, &format!("z-{step:02}.npy"))?;
+        let z = read_forces(dir, &format!("z-{step:02}.npy"), answer.z.len())?;
         quantities.push(Quantity::compare(
             "z",
             json!(answer.z),
@@ -176,40 +213,74 @@ fn run_sequence(dir: &Path, problem: &Value) -> Outcome {
     Ok((String::new(), quantities))
 }
 
-/// A square matrix, turned from C order into columns.
-fn read_matrix(dir: &Path, name: &str) -> Result<Vec<f64>, Failure> {
-    let (shape, data) = read_array::<f64>(dir, name)?;
-    match shape[..] {
+/// A square matrix of as many rows as q, by columns.
+fn read_matrix(dir: &Path, name: &str, m: usize) -> Result<Vec<f64>, Failure> {
+    let path = dir.join(name);
+    let array = npy::read::<f64>(&path)?;
+    let shape = npy::shown(&array.shape);
+    match array.shape[..] {
+        [rows, columns] if rows == columns && rows == m as u64 => {}
         [rows, columns] if rows == columns => {
-            let n = rows as usize;
-            Ok((0..n * n).map(|k| data[(k % n) * n + k / n]).collect())
+            return Err(wrong(
+                &path,
+                &format!("has shape {shape}, q has {m} entries; write both from one problem"),
+            ));
         }
-        _ => Err(Failure::Error(format!(
-            "{}: shape {shape:?} is not square",
-            dir.join(name).display()
-        ))),
+        _ => {
+            return Err(wrong(
+                &path,
+                &format!("has shape {shape}; a square matrix is wanted, ({m}, {m}) beside this q"),
+            ));
+        }
     }
+    if array.is_fortran {
+        return Ok(array.entries);
+    }
+    Ok((0..m * m)
+        .map(|k| array.entries[(k % m) * m + k / m])
+        .collect())
 }
 
 fn read(dir: &Path, name: &str) -> Result<Vec<f64>, Failure> {
-    Ok(read_array(dir, name)?.1)
+    read_list(dir, name)
 }
 
-fn read_ids(dir: &Path, name: &str) -> Result<Vec<i64>, Failure> {
-    Ok(read_array(dir, name)?.1)
+/// Forces of the reference, as many as q has entries.
+fn read_forces(dir: &Path, name: &str, m: usize) -> Result<Vec<f64>, Failure> {
+    let z = read(dir, name)?;
+    same_length(dir, name, z.len(), "q", Some(m as u64))?;
+    Ok(z)
 }
 
-fn read_array<T: npyz::Deserialize>(dir: &Path, name: &str) -> Result<(Vec<u64>, Vec<T>), Failure> {
+/// A list that is not empty.
+fn read_list<T: npy::Entry>(dir: &Path, name: &str) -> Result<Vec<T>, Failure> {
     let path = dir.join(name);
-    let wrong = |e: std::io::Error| Failure::Error(format!("{}: {e}", path.display()));
-    let file =
-        npyz::NpyFile::new(BufReader::new(File::open(&path).map_err(wrong)?)).map_err(wrong)?;
-    if file.order() != npyz::Order::C {
-        return Err(Failure::Error(format!(
-            "{}: is not in C order",
-            path.display()
-        )));
+    let array = npy::read(&path)?;
+    match array.shape[..] {
+        [n] if n > 0 => Ok(array.entries),
+        _ => Err(wrong(
+            &path,
+            &format!(
+                "has shape {}; a list of one entry or more is wanted, such as (3,)",
+                npy::shown(&array.shape)
+            ),
+        )),
     }
-    let shape = file.shape().to_vec();
-    Ok((shape, file.into_vec().map_err(wrong)?))
+}
+
+/// Two lengths that must agree, where the second is given.
+fn same_length(
+    dir: &Path,
+    name: &str,
+    length: usize,
+    other: &str,
+    other_length: Option<u64>,
+) -> Result<(), Failure> {
+    match other_length {
+        Some(n) if n != length as u64 => Err(wrong(
+            &dir.join(name),
+            &format!("has {length} entries, {other} says {n}; write both from one problem"),
+        )),
+        _ => Ok(()),
+    }
 }

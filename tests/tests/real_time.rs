@@ -102,7 +102,7 @@ fn no_step_of_an_insertion_allocates() {
         let mut shape = Shape::new(&prepared, &scene.accuracy, None).unwrap();
         let start = scene.tool.pose_part_tool;
         let at = |share: f64| DPose3 {
-            translation: start.translation + share * scene.hand.travel * scene.hand.direction,
+            translation: start.translation + share * scene.drive.travel * scene.drive.direction,
             ..start
         };
         let in_and_out: Vec<f64> = (0..=400)
@@ -143,7 +143,7 @@ fn no_tick_of_two_rates_allocates() {
     let mut engine = setup::engine(&scene, &prepared, tool).unwrap();
     let start = scene.tool.pose_part_tool;
     let at = |share: f64| DPose3 {
-        translation: start.translation + share * scene.hand.travel * scene.hand.direction,
+        translation: start.translation + share * scene.drive.travel * scene.drive.direction,
         ..start
     };
     let on_handle = |report: &StepReport| Wrench::from_array(&report.coupling_wrench_on_tool);

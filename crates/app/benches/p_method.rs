@@ -88,7 +88,7 @@ fn variant(mesh: &str, name: &str, order: u8, adaptive: Adaptive) -> Variant {
     let prepared = prepare(&setup::part_spec(&scene).unwrap(), &options, &ui).unwrap();
     let (tool, _) = setup::tool(&scene).unwrap();
     let start = scene.tool.pose_part_tool;
-    let way = scene.hand.travel * scene.hand.direction;
+    let way = scene.drive.travel * scene.drive.direction;
     Variant {
         name: name.to_owned(),
         is_adaptive: adaptive != Adaptive::Off,

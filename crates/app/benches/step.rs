@@ -46,7 +46,7 @@ fn clip() -> Clip {
     .unwrap();
     let (tool, _) = setup::tool(&scene).unwrap();
     let engine = setup::engine(&scene, &prepared, tool).unwrap();
-    let way = scene.hand.travel * scene.hand.direction;
+    let way = scene.drive.travel * scene.drive.direction;
     Clip {
         prepared,
         engine,

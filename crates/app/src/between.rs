@@ -245,6 +245,12 @@ impl<'a> BetweenNodes<'a> {
         self.between.look(surface, position_of, tool, tool_pose);
     }
 
+    /// Whether it gets so deep into faces that the force is another than the part's. `travel` (m): of the whole run.
+    pub(crate) fn gets_in(&self, travel: f64) -> bool {
+        let deepest = self.between.deepest;
+        deepest.is_some_and(|p| p.depth > TOLD_DEPTH * travel && p.depth > AT_FACE * p.spacing)
+    }
+
     /// `travel`: of the whole run, m.
     pub(crate) fn warning(&self, travel: f64) -> Option<String> {
         self.between.warning(travel, self.engine.has_edges())

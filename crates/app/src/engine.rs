@@ -13,6 +13,7 @@ mod constrained;
 mod edges;
 mod fetched;
 mod frozen;
+mod held;
 mod late;
 mod pairs;
 mod part;
@@ -40,6 +41,8 @@ use constrained::Constrained;
 pub use constrained::{BubbleData, FreeSettings, MOST_FREE};
 use edges::Edges;
 pub use frozen::{FrozenProblem, Prediction};
+pub use held::Grip;
+use held::Held;
 use late::Late;
 pub use part::ContactPart;
 use part::Deformed;
@@ -104,8 +107,7 @@ const MAX_STRIDES: f64 = 32.0;
 pub struct Engine {
     part: Arc<ContactPart>,
     tool: Tool,
-    coupling: Option<VirtualCoupling>,
-    coupling_compliance: Option<[[f64; 6]; 6]>,
+    held: Held,
     settings: EngineSettings,
     reach_of_rotation: f64,
     watch: Watch,
@@ -158,8 +160,7 @@ impl Engine {
         let scratch = Scratch::new(part.n_candidates(), max_near, max_contacts);
         Ok(Self {
             reach_of_rotation: reach_of_rotation(&tool, &part),
-            coupling_compliance: coupling.as_ref().map(VirtualCoupling::compliance),
-            coupling,
+            held: Held::by(coupling),
             settings: EngineSettings {
                 max_contacts,
                 ..settings
@@ -181,6 +182,24 @@ impl Engine {
             part,
             tool,
         })
+    }
+
+    /// Fastens the coupling at another point than the tool's origin. Deviation and wrenches are about that point then.
+    pub fn held_at(mut self, grip: Grip) -> Self {
+        self.held = self.held.at(grip);
+        self
+    }
+
+    /// Imposes the tool's place along a direction (unit vector, part's frame), whatever the coupling does across it.
+    pub fn guided_along(mut self, direction: DVec3) -> Self {
+        self.held = self.held.guided_along(direction);
+        self
+    }
+
+    /// J, in the springs that hold the tool across an imposed direction, or on all sides, under a wrench on the tool (N, N m
+    /// about the grip). 0 for an imposed pose.
+    pub fn energy_of_guide(&self, wrench: &[f64; 6]) -> f64 {
+        self.held.energy_under(wrench)
     }
 
     /// Has the tool's corners and edges touch the faces of the part between its nodes, too.
@@ -208,7 +227,6 @@ impl Engine {
             near_distance,
             n_candidates,
             max_rows,
-            self.coupling.is_none(),
         );
         self.edges = Some(Box::new(edges));
         self
@@ -258,7 +276,7 @@ impl Engine {
 
     /// The virtual coupling between handle and tool, if there is one.
     pub fn coupling(&self) -> Option<&VirtualCoupling> {
-        self.coupling.as_ref()
+        self.held.coupling()
     }
 
     /// Whether interface nodes of the part are constrained (p-method by Galerkin).
@@ -269,10 +287,7 @@ impl Engine {
     /// Where the tool is after the last step, part's frame; None before the first.
     pub fn tool_pose(&self) -> Option<DPose3> {
         let target = self.last_target.as_ref()?;
-        Some(VirtualCoupling::pose_from_deviation(
-            target,
-            &self.deviation,
-        ))
+        Some(self.held.pose(target, &self.deviation))
     }
 
     /// Whether corners and edges of the tool touch the part between its nodes.
@@ -407,7 +422,7 @@ impl Engine {
         report.passes = 0;
         report.converged = false;
         let rigid_before = report.rigid_depth;
-        let mut tool_pose = VirtualCoupling::pose_from_deviation(target, &self.deviation);
+        let mut tool_pose = self.held.pose(target, &self.deviation);
         let mut change_before = f64::INFINITY;
         while report.passes < max_passes {
             report.passes += 1;
@@ -441,14 +456,10 @@ impl Engine {
 
     /// Fills in both sides of the tool's equilibrium.
     fn balance(&self, target: &DPose3, report: &mut StepReport) {
-        report.coupling_wrench_on_tool = match &self.coupling {
-            Some(coupling) => {
-                let e = VirtualCoupling::deviation(target, &report.tool_pose);
-                coupling.wrench_on_tool(&e).to_array()
-            }
-            // An imposed pose carries whatever the contact asks for.
-            None => report.contact_wrench_on_tool.map(|x| -x),
-        };
+        let from_contact = &report.contact_wrench_on_tool;
+        report.coupling_wrench_on_tool =
+            self.held
+                .wrench_on_tool(target, &report.tool_pose, from_contact);
     }
 }
 

@@ -12,16 +12,18 @@ use glam::DVec3;
 use crate::Error;
 use crate::between::BetweenNodes;
 use crate::choice::Why;
+use crate::drive::Driven;
 use crate::effects::{Observed, Ramp, Verdict, judge};
 use crate::engine::{Engine, Stage};
 use crate::fields::FieldSolver;
 use crate::machine::Machine;
 use crate::prepare::PreparedPart;
 use crate::report::{
-    ContactForce, Effect, Facts, Frame, MultiplyFacts, MultiplyRace, Origin, Outputs, PaperStage,
-    Phase, RateFacts, Run, StepRow, TwoRateFacts, View, Viewing, Warning,
+    self, ContactForce, Doubts, DriveRow, Effect, Facts, Frame, Limits, MultiplyFacts,
+    MultiplyRace, Origin, Outputs, PaperStage, PartCurve, Phase, RateFacts, Run, StepRow,
+    StrainFacts, TwoRateFacts, View, Viewing, Warning,
 };
-use crate::scene::{EffectChoice, Handle, Scene, ToolShape};
+use crate::scene::{self, EffectChoice, Scene, ToolShape};
 use crate::session::{Record, Recording, part_extent};
 use crate::shape::Shape;
 use moments::Moments;
@@ -30,17 +32,27 @@ use moments::Moments;
 pub(crate) struct Story<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) prepared: &'a PreparedPart,
+    /// Of the drive.
     pub(crate) engine: &'a Engine,
-    pub(crate) recording: &'a Recording,
-    pub(crate) shape: &'a Shape,
+    /// The part's own curve: verdict, strain and pictures are of it.
+    pub(crate) driven: &'a Driven,
+    /// What a hand felt, if the scene has one.
+    pub(crate) felt: Option<Felt<'a>>,
     pub(crate) remarks: Vec<String>,
     /// What makes the result doubtful.
     pub(crate) doubts: Vec<Warning>,
     pub(crate) origin: Origin,
-    /// Whether the steps had to keep up with a clock.
-    pub(crate) is_real_time: bool,
     /// What a time budget was made into.
     pub(crate) picked: Option<String>,
+}
+
+/// A session of a hand.
+#[derive(Clone, Copy)]
+pub(crate) struct Felt<'a> {
+    pub(crate) recording: &'a Recording,
+    pub(crate) shape: &'a Shape,
+    /// Whether the steps had to keep up with a clock.
+    pub(crate) is_real_time: bool,
 }
 
 impl Story<'_> {
@@ -50,55 +62,41 @@ impl Story<'_> {
     /// As the field solver; Ctrl-C.
     pub(crate) fn tell(mut self, progress: &dyn fem::Progress) -> Result<Run, Error> {
         let Story {
-            scene,
-            prepared,
-            recording,
-            ..
+            scene, prepared, ..
         } = self;
+        let recording = &self.driven.recording;
         let solver = FieldSolver::new(prepared, progress)?;
-        let moments = Moments::of(recording);
+        let part_curve = PartCurve::of(&self.drive_rows());
+        let snap = part_curve.snap().map(|snap| snap.row_idx);
+        let moments = Moments::of(recording, snap);
         let mut between = BetweenNodes::new(prepared, self.engine);
         let strained = self.strain(&solver, &moments.sampled(), &mut |u, record| {
             between.look(u, &record.report.tool_pose);
         })?;
-        let mut max_rotation = strained.max_rotation;
-        let tool_extent = 0.4 * part_extent(&prepared.loaded.mesh);
-        let mut frames = Vec::new();
-        for (label, index) in moments.labelled(scene.output.frames as usize, strained.index) {
-            let record = &recording.records[index];
-            let u = solver.displacement(recording, record);
-            max_rotation = max_rotation.max(solver.extremes(&u).max_rotation);
-            let mut frame = self.frame(label, record, &u, solver.von_mises(&u), tool_extent);
-            if strained.index == Some(index) {
-                frame.strain = solver.principal_strain(&u);
-            }
-            frames.push(frame);
-        }
+        let (frames, drawn_rotation) = self.frames(&solver, &moments, strained.index);
+        let max_rotation = strained.max_rotation.max(drawn_rotation);
         self.remarks.extend(strained.facts.remarks());
-        let observed = self.observed(&moments, max_rotation);
-        let verdicts: Vec<Verdict> = judge(&observed)
+        let verdicts: Vec<Verdict> = judge(&self.observed(&moments, max_rotation))
             .into_iter()
             .filter(|v| choice(scene, v.name) == EffectChoice::Auto || v.missing)
             .collect();
-        let mut warnings = self.remarks.clone();
         let way = recording.records.iter().map(|r| r.travel);
-        warnings.extend(between.warning(way.fold(0.0, f64::max)));
-        warnings.extend(self.shape.choice().warning());
-        warnings.extend(self.shape.given_up().map(str::to_owned));
-        warnings.extend(verdicts.iter().filter(|v| v.missing).map(|v| {
-            let number = v
-                .number
-                .map(|n| format!(" ({n:.2} beyond {:.2})", v.threshold));
-            format!(
-                "this scene calls for {}, which this version does not simulate{}: {}",
-                v.name.replace('_', " "),
-                number.unwrap_or_default(),
-                v.why
-            )
-        }));
+        let way = way.fold(0.0, f64::max);
+        let gets_in = between.gets_in(way);
+        let between = between.warning(way);
+        let mut doubts: Vec<String> = between.clone().filter(|_| gets_in).into_iter().collect();
+        // A way that ends behind the snap ends at a seat.
+        doubts.extend(self.stopped().filter(|_| snap.is_none()));
+        let driven = self.judged(&verdicts, doubts, &strained.facts);
+        let mut warnings = self.remarks.clone();
+        warnings.extend(between);
+        warnings.extend(self.stopped());
+        warnings.extend(verdicts.iter().filter_map(words::called_for));
         warnings.extend(self.troubles());
-        let rows: Vec<StepRow> = recording.records.iter().map(|r| self.row(r)).collect();
-        let loaded = &prepared.loaded;
+        let felt = self.felt.map(|felt| felt.recording);
+        let rows: Vec<StepRow> = felt.map_or_else(Vec::new, |felt| {
+            felt.records.iter().map(|r| self.row(felt, r)).collect()
+        });
         Ok(Run {
             title: scene.title.clone(),
             scene_path: scene.path.display().to_string(),
@@ -112,39 +110,15 @@ impl Story<'_> {
                 warnings.into_iter().map(Warning::from).collect(),
             ]
             .concat(),
-            facts: Facts {
-                nodes: loaded.mesh.n_nodes(),
-                elements: loaded.mesh.n_elements(),
-                order: loaded.mesh.order as u32,
-                surface_nodes: loaded.rows.len(),
-                candidates: loaded.candidates.len(),
-                coupling_stiffness: Some(scene.coupling.translational_stiffness),
-                prepare_s: prepared.total_seconds(),
-                from_cache: prepared.from_cache,
-                missed_deadlines: self
-                    .is_real_time
-                    .then_some(recording.servo.missed_deadlines),
-                max_principal_strain: strained.facts.value(),
-                max_rotation_deg: max_rotation.to_degrees(),
-                rates: rate_facts(recording),
-                multiply: multiply_facts(self.shape),
-            },
-            handbook: handbook::beside(scene, &rows, recording.direction, strained.facts.value()),
+            facts: self.facts(&strained.facts, max_rotation),
+            handbook: handbook::beside(scene, recording, strained.facts.value()),
             strain: strained.facts,
             paper: paper(&rows),
+            driven: Some(driven),
             rows,
-            part: drawing::part(&loaded.mesh),
+            part: drawing::part(&prepared.loaded.mesh),
             frames,
-            effects: verdicts
-                .into_iter()
-                .map(|v| Effect {
-                    name: v.name.to_owned(),
-                    on: v.on,
-                    number: v.number,
-                    threshold: v.threshold,
-                    why: v.why,
-                })
-                .collect(),
+            effects: verdicts.into_iter().map(effect).collect(),
             viewing: viewing(scene, recording.direction),
             outputs: Outputs {
                 png: scene.output.pictures,
@@ -154,19 +128,107 @@ impl Story<'_> {
         })
     }
 
-    fn row(&self, record: &Record) -> StepRow {
+    /// Pictures of the moments that are worth one, and the largest rotation in them, rad.
+    fn frames(
+        &self,
+        solver: &FieldSolver<'_>,
+        moments: &Moments,
+        strained: Option<usize>,
+    ) -> (Vec<Frame>, f64) {
+        let recording = &self.driven.recording;
+        let tool_extent = 0.4 * part_extent(&self.prepared.loaded.mesh);
+        let mut max_rotation = 0.0_f64;
+        let mut frames = Vec::new();
+        let count = self.scene.output.frames as usize;
+        for (label, index) in moments.labelled(count, strained) {
+            let record = &recording.records[index];
+            let u = solver.displacement(recording, record);
+            max_rotation = max_rotation.max(solver.extremes(&u).max_rotation);
+            let mut frame = self.frame(label, record, &u, solver.von_mises(&u), tool_extent);
+            if strained == Some(index) {
+                frame.strain = solver.principal_strain(&u);
+            }
+            frames.push(frame);
+        }
+        (frames, max_rotation)
+    }
+
+    fn facts(&self, strain: &StrainFacts, max_rotation: f64) -> Facts {
+        let loaded = &self.prepared.loaded;
+        let felt = self.felt.as_ref();
+        Facts {
+            nodes: loaded.mesh.n_nodes(),
+            elements: loaded.mesh.n_elements(),
+            order: loaded.mesh.order as u32,
+            surface_nodes: loaded.rows.len(),
+            candidates: loaded.candidates.len(),
+            coupling_stiffness: felt.map(|_| self.scene.coupling.translational_stiffness),
+            prepare_s: self.prepared.total_seconds(),
+            from_cache: self.prepared.from_cache,
+            missed_deadlines: felt
+                .filter(|felt| felt.is_real_time)
+                .map(|felt| felt.recording.servo.missed_deadlines),
+            max_principal_strain: strain.value(),
+            max_rotation_deg: max_rotation.to_degrees(),
+            rates: felt.map_or_else(Default::default, |felt| rate_facts(felt.recording)),
+            multiply: felt.map_or_else(Default::default, |felt| multiply_facts(felt.shape)),
+        }
+    }
+
+    /// The driven curve as the report is given it.
+    fn drive_rows(&self) -> Vec<DriveRow> {
+        let recording = &self.driven.recording;
+        let row = |r: &Record| DriveRow {
+            phase: phase(r),
+            travel_m: r.travel,
+            force_n: recording.resistance(r) + 0.0,
+            sideways_m: r.sideways,
+            turn_rad: r.turn,
+            contacts: r.report.contacts,
+            is_converged: r.report.converged && r.report.lcp_solved && r.report.dropped == 0,
+            passed_m: 0.0,
+        };
+        recording.records.iter().map(row).collect()
+    }
+
+    /// The driven curve with its verdict. `others`: what makes it another than the part's, besides missing effects.
+    fn judged(
+        &self,
+        effects: &[Verdict],
+        others: Vec<String>,
+        strain: &StrainFacts,
+    ) -> report::Driven {
+        let doubts = Doubts {
+            missing_effects: effects.iter().filter_map(words::called_for).collect(),
+            passed_tolerance_m: 0.0,
+            friction_share: effects
+                .iter()
+                .find(|v| v.missing && v.name == "friction")
+                .and_then(|v| v.number),
+            others,
+        };
+        let asked = &self.scene.limits;
+        let limits = Limits {
+            insertion_below: asked.insertion_below,
+            removal_above: asked.removal_above,
+            strain_below: asked.strain_below,
+            strain_use: match asked.strain_use {
+                scene::StrainUse::Once => report::StrainUse::Once,
+                scene::StrainUse::Repeatedly => report::StrainUse::Repeatedly,
+            },
+        };
+        report::Driven::of(self.drive_rows(), &doubts, &limits, strain)
+    }
+
+    fn row(&self, felt: &Recording, record: &Record) -> StepRow {
         let reach = part_extent(&self.prepared.loaded.mesh);
         StepRow {
             step: record.step,
             time_s: record.time_s,
-            phase: match record.phase {
-                device::Phase::Approach => Phase::Approach,
-                device::Phase::Retract => Phase::Retract,
-                device::Phase::Hold | device::Phase::Done => Phase::Hold,
-            },
+            phase: phase(record),
             travel_m: record.travel,
             // Adding zero turns a negative zero into a zero.
-            force_n: self.recording.resistance(record) + 0.0,
+            force_n: felt.resistance(record) + 0.0,
             force_on_handle: record.wrench_on_handle.force + DVec3::ZERO,
             contacts: record.report.contacts,
             pivots: record.report.pivots,
@@ -190,8 +252,8 @@ impl Story<'_> {
     ) -> Frame {
         let loaded = &self.prepared.loaded;
         let displacement: Vec<DVec3> = u.chunks_exact(3).map(DVec3::from_slice).collect();
-        let contacts = self
-            .recording
+        let recording = &self.driven.recording;
+        let contacts = recording
             .contacts(record)
             .iter()
             .map(|c| {
@@ -211,7 +273,7 @@ impl Story<'_> {
             label,
             step: record.step,
             travel_m: record.travel,
-            force_n: self.recording.resistance(record) + 0.0,
+            force_n: recording.resistance(record) + 0.0,
             displacement,
             von_mises,
             strain: Vec::new(),
@@ -221,8 +283,9 @@ impl Story<'_> {
     }
 
     fn observed(&self, moments: &Moments, max_rotation: f64) -> Observed {
-        let records = &self.recording.records;
-        let fastest = records
+        // Nothing runs through anything where the steps are those of the way itself.
+        let felt = self.felt.map_or(&[][..], |felt| &felt.recording.records);
+        let fastest = felt
             .windows(2)
             .map(|w| {
                 (w[1].report.tool_pose.translation - w[0].report.tool_pose.translation).length()
@@ -243,14 +306,12 @@ impl Story<'_> {
 
     /// What the body slides on at the peak, what it comes back over, and whether it went past the peak.
     fn ramps(&self, moments: &Moments) -> (Ramp, Option<Ramp>, bool) {
-        let records = &self.recording.records;
+        let recording = &self.driven.recording;
+        let records = &recording.records;
         // Contacts are in the part's frame, where a held part stands still and the tool comes.
-        let way = match self.scene.handle {
-            Handle::Tool => self.recording.direction,
-            Handle::Part => -self.recording.direction,
-        };
-        let at = |i: usize| Ramp::of(self.recording.contacts(&records[i]), way);
-        let force = |i: usize| self.recording.resistance(&records[i]);
+        let way = self.driven.held.way_of_tool(recording.direction);
+        let at = |i: usize| Ramp::of(recording.contacts(&records[i]), way);
+        let force = |i: usize| recording.resistance(&records[i]);
         let Some(peak) = moments.peak else {
             return (Ramp::default(), None, false);
         };
@@ -261,6 +322,24 @@ impl Story<'_> {
             .filter(|&i| force(i) < 0.0)
             .map(|i| at(i).reversed());
         (at(peak), release, has_passed)
+    }
+}
+
+fn phase(record: &Record) -> Phase {
+    match record.phase {
+        device::Phase::Approach => Phase::Approach,
+        device::Phase::Retract => Phase::Retract,
+        device::Phase::Hold | device::Phase::Done => Phase::Hold,
+    }
+}
+
+fn effect(verdict: Verdict) -> Effect {
+    Effect {
+        name: verdict.name.to_owned(),
+        on: verdict.on,
+        number: verdict.number,
+        threshold: verdict.threshold,
+        why: verdict.why,
     }
 }
 

@@ -11,6 +11,7 @@ pub mod between;
 pub mod choice;
 pub mod cli;
 pub mod crash;
+pub mod drive;
 pub mod effects;
 pub mod engine;
 mod error;

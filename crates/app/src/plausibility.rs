@@ -6,6 +6,7 @@
 
 mod bounce;
 mod coupling;
+mod gave_way;
 mod groups;
 mod order;
 mod script;
@@ -18,11 +19,12 @@ mod units;
 use contact::tool::Tool;
 
 use crate::Error;
+use crate::drive::Driven;
 use crate::engine::Engine;
 use crate::prepare::{LoadedPart, PrepareOptions, PreparedPart};
 use crate::progress::Ui;
 use crate::report::Warning;
-use crate::scene::Scene;
+use crate::scene::{Hand, Scene};
 use crate::session::Recording;
 use track::Track;
 
@@ -64,30 +66,56 @@ pub(crate) fn before(scene: &Scene, prepared: &PreparedPart, tool: &Tool) -> Vec
     warnings
 }
 
+/// What a run left behind.
+pub(crate) struct Ran<'a> {
+    pub(crate) prepared: &'a PreparedPart,
+    pub(crate) engine: &'a Engine,
+    pub(crate) driven: &'a Driven,
+    /// What a hand felt, if there was one.
+    pub(crate) felt: Option<&'a Recording>,
+}
+
 /// Doubts that a run gives rise to. What another order of the elements gives is computed where it is cheap.
 ///
 /// # Errors
 /// Ctrl-C.
 pub(crate) fn after(
     scene: &Scene,
-    prepared: &PreparedPart,
-    engine: &Engine,
-    recording: &Recording,
+    ran: &Ran<'_>,
     options: &PrepareOptions,
 ) -> Result<Vec<Warning>, Error> {
-    let track = Track::of(scene, recording);
+    let driven = &ran.driven.recording;
+    let track = Track::of_drive(scene, driven);
     let mut warnings: Vec<Warning> = [
-        touch::nothing_touched(scene, prepared, engine, recording),
-        script::not_arrived(&track),
-        script::few_steps_to_the_peak(&track),
-        bounce::bounced(&track),
+        touch::nothing_touched(scene, ran.prepared, ran.engine, driven),
         bounce::negative_work(&track),
-        coupling::too_stiff(scene, recording),
-        teeth::from_node_to_node(&track, recording, &prepared.loaded),
+        teeth::from_node_to_node(&track, driven, &ran.prepared.loaded),
     ]
     .into_iter()
     .flatten()
     .collect();
-    warnings.extend(order::checked(scene, prepared, track.peak_force, options)?);
+    if let (Some(felt), Some(hand)) = (ran.felt, &scene.hand) {
+        warnings.extend(of_hand(scene, hand, felt, &track));
+    }
+    warnings.extend(order::checked(
+        scene,
+        ran.prepared,
+        track.peak_force,
+        options,
+    )?);
     Ok(warnings)
+}
+
+/// Doubts about what the hand felt. `driven`: the part's own curve.
+fn of_hand(scene: &Scene, hand: &Hand, felt: &Recording, driven: &Track) -> Vec<Warning> {
+    let track = Track::of(scene, hand, felt);
+    let warnings = [
+        script::not_arrived(&track),
+        script::few_steps_to_the_peak(&track),
+        bounce::bounced(&track),
+        bounce::negative_work(&track).filter(|_| bounce::negative_work(driven).is_none()),
+        coupling::too_stiff(scene, hand, felt),
+        gave_way::gave_way(&track, driven),
+    ];
+    warnings.into_iter().flatten().collect()
 }

@@ -10,6 +10,7 @@ mod error;
 pub mod html;
 pub mod mcap_file;
 pub mod origin;
+pub mod part_curve;
 pub mod plot;
 pub mod render;
 pub mod strain;
@@ -26,18 +27,21 @@ use std::path::{Path, PathBuf};
 
 pub use curve::Curve;
 pub use data::{
-    CellKind, ContactForce, Effect, Facts, Frame, Handbook, HandbookRow, MultiplyFacts,
-    MultiplyRace, N_STAGES, Outputs, PaperStage, PartDrawing, Phase, RateFacts, Run, STAGE_NAMES,
-    StepRow, TwoRateFacts, View, Viewing, Warning,
+    CellKind, ContactForce, DriveRow, Driven, Effect, Facts, Frame, Handbook, HandbookRow,
+    MultiplyFacts, MultiplyRace, N_STAGES, Outputs, PaperStage, PartDrawing, Phase, RateFacts, Run,
+    STAGE_NAMES, StepRow, TwoRateFacts, View, Viewing, Warning,
 };
 pub use error::ReportError;
 pub use origin::{InputFile, Origin};
+pub use part_curve::{
+    Doubts, LimitFact, LimitState, Limits, Outcome, PartCurve, StrainUse, Verdict,
+};
 pub use strain::{PeakKind, StrainFacts, StrainPeak};
 
 /// Writes the whole result folder of `run` into the existing directory `dir`.
 ///
-/// Files: `report.html`, `force-travel.csv`, `force-travel.svg`, `timing.csv`, `step-time.svg`,
-/// `summary.json`, `session.mcap`, and below `frames` for each frame `NN-label.png` (displacement),
+/// Files: `report.html`, `curve.csv`, `force-travel.svg`, `summary.json`; with a hand `force-travel.csv`,
+/// `timing.csv`, `step-time.svg` and `session.mcap`; and below `frames` for each frame `NN-label.png` (displacement),
 /// `NN-label-stress.png` and `NN-label.vtu`, with `NN-label-strain.png` at the largest strain; the larger ones as [`Outputs`] asks. Returns the
 /// paths of what was written, in the order of writing. The same run gives the same bytes.
 ///
@@ -48,29 +52,33 @@ pub fn write_all(dir: &Path, run: &Run) -> Result<Vec<PathBuf>, ReportError> {
     let mut written = Vec::new();
     let curve = Curve::of(&run.rows);
 
-    write_file(
-        &mut written,
-        &dir.join("force-travel.csv"),
-        csv::force_travel(&run.rows).as_bytes(),
-    )?;
-    write_file(
-        &mut written,
-        &dir.join("timing.csv"),
-        csv::timing(&run.rows).as_bytes(),
-    )?;
+    if let Some(driven) = &run.driven {
+        let text = csv::curve(&driven.rows);
+        write_file(&mut written, &dir.join("curve.csv"), text.as_bytes())?;
+    }
+    let is_felt = !run.rows.is_empty();
+    if is_felt {
+        let text = csv::force_travel(&run.rows);
+        write_file(&mut written, &dir.join("force-travel.csv"), text.as_bytes())?;
+        let text = csv::timing(&run.rows);
+        write_file(&mut written, &dir.join("timing.csv"), text.as_bytes())?;
+    }
     let summary = summary::json(run, &curve);
     write_file(&mut written, &dir.join("summary.json"), summary.as_bytes())?;
 
     let force_path = dir.join("force-travel.svg");
-    let series = plot::force::felt(run);
-    let mark = plot::force::peak(&curve);
+    let series = plot::force::curves(run);
+    let mark = plot::force::peak(run, &curve);
     let force_svg = plot_formats(&force_path, |format| {
         plot::force_travel(&series, mark.as_ref(), format)
     })?;
     write_file(&mut written, &force_path, force_svg.wide.as_bytes())?;
     let time_path = dir.join("step-time.svg");
-    let time_svg = plot_formats(&time_path, |format| plot::step_time(&run.rows, format))?;
-    write_file(&mut written, &time_path, time_svg.wide.as_bytes())?;
+    let mut time_svg = html::Plot::default();
+    if is_felt {
+        time_svg = plot_formats(&time_path, |format| plot::step_time(&run.rows, format))?;
+        write_file(&mut written, &time_path, time_svg.wide.as_bytes())?;
+    }
 
     let frames_dir = dir.join("frames");
     if !run.frames.is_empty() && (run.outputs.png || run.outputs.vtu) {
@@ -91,7 +99,7 @@ pub fn write_all(dir: &Path, run: &Run) -> Result<Vec<PathBuf>, ReportError> {
             write_file(&mut written, &path, &bytes)?;
         }
     }
-    if run.outputs.mcap {
+    if run.outputs.mcap && is_felt {
         let path = dir.join("session.mcap");
         let bytes = mcap_file::session(run).map_err(|e| ReportError::recording(&path, e))?;
         write_file(&mut written, &path, &bytes)?;
@@ -261,6 +269,7 @@ mod tests {
                 "02-peak-stress.png",
                 "02-peak.png",
                 "02-peak.vtu",
+                "curve.csv",
                 "force-travel.csv",
                 "force-travel.svg",
                 "report.html",
@@ -332,7 +341,7 @@ mod tests {
             .unwrap_err()
             .to_string();
         assert!(error.contains("gone"), "{error}");
-        assert!(error.contains("force-travel.csv"), "{error}");
+        assert!(error.contains("curve.csv"), "{error}");
     }
 
     #[test]

@@ -48,10 +48,16 @@ pub struct Scene {
     pub part: Part,
     /// The rigid tool.
     pub tool: Tool,
-    /// Which of the two the hand holds.
+    /// Which of the two is held and moved.
     pub handle: Handle,
-    /// The scripted hand.
-    pub hand: Hand,
+    /// Where the held body is held, m, in its own frame; `None`: the centre of its bounding box.
+    pub grip: Option<DVec3>,
+    /// The way of the held body in the part's own curve.
+    pub drive: Drive,
+    /// The scripted hand, if one is to feel the part too.
+    pub hand: Option<Hand>,
+    /// What the part's own curve has to keep.
+    pub limits: Limits,
     /// Spring between handle and held body.
     pub coupling: Coupling,
     /// The haptic device.
@@ -111,11 +117,6 @@ impl Scene {
             what: format!("the mesh has no group `{}`", error::plain(&group.name)),
             mend: error::suggestion(&group.name, &known),
         }
-    }
-
-    /// Servo periods that the script of the hand takes.
-    pub fn steps(&self) -> u64 {
-        (self.hand.duration() / self.device.servo_period).ceil() as u64
     }
 }
 
@@ -269,7 +270,7 @@ pub struct FieldOf {
     pub line: usize,
 }
 
-/// What the hand holds.
+/// What is held and moved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Handle {
@@ -278,6 +279,56 @@ pub enum Handle {
     Tool,
     /// the part moves, the tool is fixed in the world.
     Part,
+}
+
+/// The way that the held body is driven, rigidly, as by a testing machine.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drive {
+    /// Unit vector in the world: where the held body goes.
+    pub direction: DVec3,
+    /// m, > 0.
+    pub travel: f64,
+    /// m between two places, > 0, at most `travel`; finer where the force bends.
+    pub step: f64,
+    /// What the body does across the direction.
+    pub guide: Guide,
+    /// Whether it is pulled out again.
+    pub retract: bool,
+}
+
+/// What the driven body does across its direction.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Guide {
+    /// it goes along `direction` only and does not turn; models with planes of symmetry need this.
+    #[default]
+    Axis,
+    /// it gives way across `direction` and turns, against the springs of `[coupling]`.
+    Free,
+}
+
+/// What the part's own curve has to keep; each limit that is not kept fails the run.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Limits {
+    /// N, the peak of the way in stays below, > 0.
+    pub insertion_below: Option<f64>,
+    /// N, the largest pull of the way out goes above, > 0.
+    pub removal_above: Option<f64>,
+    /// The largest principal strain stays below, > 0 (0.02 is 2 %).
+    pub strain_below: Option<f64>,
+    /// How often the joint is used.
+    pub strain_use: StrainUse,
+}
+
+/// How often a joint is opened and closed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum StrainUse {
+    /// once: `strain_below` as it is.
+    #[default]
+    Once,
+    /// often: 60 % of `strain_below`.
+    Repeatedly,
 }
 
 /// The scripted hand: a mass on a spring and a damper, whose other end follows the script.

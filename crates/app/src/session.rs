@@ -8,6 +8,7 @@
 mod beside;
 pub mod fast;
 pub mod handover;
+mod held;
 mod overlap;
 pub mod rates;
 mod recorder;
@@ -31,7 +32,8 @@ use crate::prepare::PreparedPart;
 use crate::shape::{self, Shape};
 use crate::{Error, interrupt};
 use fast::FastSettings;
-use overlap::refuse_overlap;
+pub use held::{Held, Holds};
+pub use overlap::{Clearance, refuse_overlap};
 use rates::{ChosenRates, Rates, TwoRates, choose};
 use recorder::{Recorder, Solved};
 use slow::{SlowStep, Stepped};
@@ -52,6 +54,10 @@ pub struct Record {
     pub handle_pose: DPose3,
     /// m, of the held body in the simulation, along the approach direction.
     pub travel: f64,
+    /// m, of its grip across that direction.
+    pub sideways: f64,
+    /// rad, of the held body from how it stood at the start.
+    pub turn: f64,
     /// On the handle, about the handle point, world; what the engine gives, before the device's
     /// limits and resolution.
     pub wrench_on_handle: Wrench,
@@ -86,7 +92,70 @@ pub struct Recording {
     bubbles: Vec<(u32, DVec3)>,
 }
 
+/// What a record is made of, besides the step itself.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Entry {
+    /// s, of the loop's clock; 0 without one.
+    pub(crate) time_s: f64,
+    pub(crate) phase: Phase,
+    pub(crate) handle_pose: DPose3,
+    pub(crate) wrench_on_handle: Wrench,
+    pub(crate) step_ns: u64,
+}
+
 impl Recording {
+    /// An empty one with memory for so many records. `direction`: of any length but zero.
+    pub(crate) fn with_room(direction: DVec3, n_records: usize, rates: ChosenRates) -> Self {
+        Self {
+            records: Vec::with_capacity(n_records),
+            direction: direction.normalize(),
+            servo: ServoReport::default(),
+            device: SimulatedEvents::default(),
+            max_surface_displacement: 0.0,
+            rates,
+            two_rates: None,
+            contacts: Vec::with_capacity(64 * n_records),
+            bubbles: Vec::new(),
+        }
+    }
+
+    /// Adds a record. Does not allocate within the memory that was asked for.
+    pub(crate) fn push(
+        &mut self,
+        entry: &Entry,
+        held: &Held,
+        report: &StepReport,
+        contacts: &[ActiveContact],
+    ) {
+        let (body, start) = (held.pose(&report.tool_pose), held.start());
+        let moved = body.translation - start.translation;
+        let contacts_from = self.contacts.len();
+        self.contacts.extend_from_slice(contacts);
+        self.records.push(Record {
+            step: self.records.len() as u64,
+            time_s: entry.time_s,
+            phase: entry.phase,
+            handle_pose: entry.handle_pose,
+            travel: moved.dot(self.direction),
+            sideways: (moved - self.direction * moved.dot(self.direction)).length(),
+            turn: body.rotation.angle_between(start.rotation),
+            wrench_on_handle: entry.wrench_on_handle,
+            report: *report,
+            step_ns: entry.step_ns,
+            multiply_ns: None,
+            contacts: contacts_from..self.contacts.len(),
+            bubbles: self.bubbles.len()..self.bubbles.len(),
+        });
+    }
+
+    /// Adds the free interface nodes of a constrained part to the last record.
+    pub(crate) fn push_bubbles(&mut self, amplitudes: &[(u32, DVec3)]) {
+        self.bubbles.extend_from_slice(amplitudes);
+        if let Some(last) = self.records.last_mut() {
+            last.bubbles.end = self.bubbles.len();
+        }
+    }
+
     /// Contacts that carried force in a record.
     pub fn contacts(&self, record: &Record) -> &[ActiveContact] {
         &self.contacts[record.contacts.clone()]
@@ -104,26 +173,13 @@ impl Recording {
     }
 }
 
-/// Which body the device holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Holds {
-    /// The tool; the part is fixed in the world.
-    Tool,
-    /// The part; the tool is fixed in the world.
-    Part,
-}
-
 /// What a session needs beyond the engine.
 #[derive(Clone, Debug)]
 pub struct SessionSpec {
-    /// Which body the device holds.
-    pub holds: Holds,
-    /// Tool in the world at the start, m.
-    pub tool_pose: DPose3,
+    /// The body that the device holds.
+    pub held: Held,
     /// Whether the tool may start in the part.
-    pub may_overlap: bool,
-    /// Length unit of messages: its name, and m.
-    pub length_unit: (&'static str, f64),
+    pub clearance: Clearance,
     /// Approach of the held body.
     pub direction: DVec3,
     /// m/s.
@@ -156,11 +212,9 @@ pub fn run(
     shape: &mut Shape,
     progress: &dyn fem::Progress,
 ) -> Result<Recording, Error> {
-    refuse_overlap(spec, &prepared.loaded.mesh, engine)?;
-    let start = match spec.holds {
-        Holds::Tool => spec.tool_pose,
-        Holds::Part => DPose3::IDENTITY,
-    };
+    let mesh = &prepared.loaded.mesh;
+    refuse_overlap(&spec.clearance, mesh, engine.tool(), &spec.held.tool_pose)?;
+    let start = spec.held.start();
     let script = Script::new(&Insertion {
         start,
         direction: spec.direction,
@@ -186,7 +240,7 @@ pub fn run(
     };
     let every = rates.every;
     let session = Session {
-        recorder: Recorder::new(spec, script, start, n_periods, rates),
+        recorder: Recorder::new(spec, script, n_periods, rates),
         device,
         n_periods,
         progress,

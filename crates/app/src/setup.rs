@@ -13,6 +13,7 @@ use device::{HandSettings, VirtualCoupling};
 use fem::{Material, Quadrature};
 
 use crate::Error;
+use crate::drive::DriveSpec;
 use crate::engine::{ContactIterations, Engine, EngineSettings, FreeSettings};
 use crate::machine::Machine;
 use crate::prepare::budget::bytes;
@@ -21,7 +22,7 @@ use crate::scene::{
     self, Adaptive, FreeNodes, PMethod, QuadratureRule, Scene, ToolFeatures, ToolShape,
 };
 use crate::session::rates::Rates;
-use crate::session::{Holds, SessionSpec, part_extent};
+use crate::session::{Clearance, Held, Holds, SessionSpec, part_extent};
 
 /// The part of a scene.
 ///
@@ -193,11 +194,57 @@ fn with_field(
     Ok(Tool::Field(Arc::new(built)))
 }
 
-/// The engine of a scene.
+/// The engine of a scene's session: handle and tool are joined by the virtual coupling.
 ///
 /// # Errors
 /// Settings that the crates refuse; a distance of near nodes beyond the part's size.
 pub fn engine(scene: &Scene, prepared: &PreparedPart, tool: Tool) -> Result<Engine, Error> {
+    let grip = held(scene, prepared, &tool).engine_grip();
+    let engine = engine_with(
+        scene,
+        prepared,
+        tool,
+        Some(coupling(scene)?),
+        scene.accuracy.max_contacts,
+    )?;
+    Ok(engine.held_at(grip))
+}
+
+/// The engine of the part's own curve: the tool's pose is imposed, or guided along the direction. `max_contacts`: rows of
+/// a contact problem at most, in place of the scene's.
+///
+/// # Errors
+/// As [`engine`].
+pub fn drive_engine(
+    scene: &Scene,
+    prepared: &PreparedPart,
+    tool: Tool,
+    max_contacts: usize,
+) -> Result<Engine, Error> {
+    let held = held(scene, prepared, &tool);
+    let coupling = match scene.drive.guide {
+        scene::Guide::Axis => None,
+        scene::Guide::Free => Some(coupling(scene)?),
+    };
+    let engine = engine_with(scene, prepared, tool, coupling, max_contacts)?;
+    let way = held.way_of_tool(scene.drive.direction);
+    Ok(engine.held_at(held.engine_grip()).guided_along(way))
+}
+
+fn coupling(scene: &Scene) -> Result<VirtualCoupling, Error> {
+    Ok(VirtualCoupling::new(
+        scene.coupling.translational_stiffness,
+        scene.coupling.rotational_stiffness,
+    )?)
+}
+
+fn engine_with(
+    scene: &Scene,
+    prepared: &PreparedPart,
+    tool: Tool,
+    coupling: Option<VirtualCoupling>,
+    max_contacts: usize,
+) -> Result<Engine, Error> {
     let extent = part_extent(&prepared.loaded.mesh);
     if let Some(near) = scene.accuracy.near_distance.filter(|near| *near > extent) {
         return Err(Error::Input(format!(
@@ -214,15 +261,11 @@ pub fn engine(scene: &Scene, prepared: &PreparedPart, tool: Tool) -> Result<Engi
         },
         displacement_tolerance: DISPLACEMENT_TOLERANCE.min(TOLERANCE_SHARE * extent),
         near_distance: scene.accuracy.near_distance.unwrap_or(NEAR_SHARE * size),
-        max_contacts: scene.accuracy.max_contacts,
+        max_contacts,
         merge_tolerance: scene.accuracy.merge_tolerance,
         lcp: lcp_settings(scene),
         max_stride: STRIDE_SHARE * size,
     };
-    let coupling = VirtualCoupling::new(
-        scene.coupling.translational_stiffness,
-        scene.coupling.rotational_stiffness,
-    )?;
     let in_scene = |source| Error::Tool {
         path: scene.path.clone(),
         source,
@@ -244,9 +287,9 @@ pub fn engine(scene: &Scene, prepared: &PreparedPart, tool: Tool) -> Result<Engi
                 FreeNodes::Indicator(limit) => FreeSettings::bent_beyond(limit),
                 FreeNodes::BudgetUs(budget) => FreeSettings::affordable(budget, &data),
             };
-            Engine::constrained(coarse, data, rule, tool, Some(coupling), settings)
+            Engine::constrained(coarse, data, rule, tool, coupling, settings)
         }
-        _ => Engine::new(prepared.contact_part(), tool, Some(coupling), settings),
+        _ => Engine::new(prepared.contact_part(), tool, coupling, settings),
     };
     let engine = engine.map_err(in_scene)?;
     if let (Some(_), scene::Rates::Every(_)) = (&edges, scene.accuracy.rates) {
@@ -343,17 +386,46 @@ const NEAR_SHARE: f64 = 0.0004;
 /// Share of the tool's size that the tool moves in one go.
 const STRIDE_SHARE: f64 = 0.02;
 
-/// The scripted session of a scene.
-pub fn session(scene: &Scene) -> SessionSpec {
-    let hand = &scene.hand;
-    SessionSpec {
-        holds: match scene.handle {
-            scene::Handle::Tool => Holds::Tool,
-            scene::Handle::Part => Holds::Part,
-        },
-        tool_pose: scene.tool.pose_part_tool,
+/// The body of a scene that is held, and where.
+pub fn held(scene: &Scene, prepared: &PreparedPart, tool: &Tool) -> Held {
+    let holds = match scene.handle {
+        scene::Handle::Tool => Holds::Tool,
+        scene::Handle::Part => Holds::Part,
+    };
+    let mesh = &prepared.loaded.mesh;
+    let centred = Held::centred(holds, scene.tool.pose_part_tool, tool, mesh);
+    Held {
+        grip: scene.grip.unwrap_or(centred.grip),
+        ..centred
+    }
+}
+
+/// Whether the tool of a scene may start in the part.
+pub fn clearance(scene: &Scene) -> Clearance {
+    Clearance {
         may_overlap: scene.tool.start == scene::Start::Overlap,
         length_unit: scene.length_unit(),
+    }
+}
+
+/// The way of a scene's held body in the part's own curve.
+pub fn drive(scene: &Scene, held: Held) -> DriveSpec {
+    let drive = &scene.drive;
+    DriveSpec {
+        held,
+        direction: drive.direction,
+        travel: drive.travel,
+        step: drive.step,
+        retract: drive.retract,
+    }
+}
+
+/// The scripted session of a scene that has a hand.
+pub fn session(scene: &Scene, held: Held) -> Option<SessionSpec> {
+    let hand = scene.hand.as_ref()?;
+    Some(SessionSpec {
+        held,
+        clearance: clearance(scene),
         direction: hand.direction,
         speed: hand.speed,
         travel: hand.travel,
@@ -374,5 +446,5 @@ pub fn session(scene: &Scene) -> SessionSpec {
             scene::Rates::One => Rates::One,
             scene::Rates::Every(n) => Rates::Every(n),
         },
-    }
+    })
 }

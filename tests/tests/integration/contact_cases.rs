@@ -154,8 +154,12 @@ fn held_nodes_stop_every_tool() {
             0.200,
         );
     }
-    let by_part = bar(ball, "[holds]\nhandle = \"part\"").replace("[0, 0, -1]", "[0, 0, 1]");
-    // The hand holds the part beside the line of the force: its wrist gives way a little, too.
+    let by_part = bar(
+        ball,
+        "[holds]\nhandle = \"part\"\ngrip = [0.01, 0.005, 0.0025]",
+    )
+    .replace("[0, 0, -1]", "[0, 0, 1]");
+    // Held on the line of the force; beside it the wrist would give way a little, too.
     let (f, t) = peak(&by_part);
     assert!(
         (f - 2.142).abs() < 0.01 && (t - 0.2).abs() < 0.02,

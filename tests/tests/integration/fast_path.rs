@@ -400,7 +400,7 @@ fn compare(name: &str, as_mesh: bool, deepest: f64) {
         play = 0.98 * play + 0.1 * largest_motion * random();
         turn = 0.98 * turn + 1e-4 * random();
         let target = DPose3 {
-            translation: start.translation + way * scene.hand.direction + play,
+            translation: start.translation + way * scene.drive.direction + play,
             rotation: DQuat::from_scaled_axis(turn) * start.rotation,
         };
         let report = fast.step(&target);

@@ -9,6 +9,7 @@ mod broken_cases;
 mod cache;
 mod contact_cases;
 mod docs;
+mod drive;
 mod fast_path;
 mod multiply;
 mod p_method;

@@ -44,7 +44,7 @@ impl Clip {
         let start = self.scene.tool.pose_part_tool;
         DPose3 {
             translation: start.translation
-                + share * self.scene.hand.travel * self.scene.hand.direction,
+                + share * self.scene.drive.travel * self.scene.drive.direction,
             ..start
         }
     }

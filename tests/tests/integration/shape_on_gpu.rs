@@ -19,6 +19,11 @@ fn prepared(scene: &Scene) -> PreparedPart {
     prepare(&spec, &PrepareOptions::default(), &ui).unwrap()
 }
 
+fn held(scene: &Scene, part: &PreparedPart) -> session::Held {
+    let (tool, _) = setup::tool(scene).unwrap();
+    setup::held(scene, part, &tool)
+}
+
 fn engine(scene: &Scene, part: &PreparedPart) -> Engine {
     let (tool, _) = setup::tool(scene).unwrap();
     setup::engine(scene, part, tool).unwrap()
@@ -26,7 +31,7 @@ fn engine(scene: &Scene, part: &PreparedPart) -> Engine {
 
 fn clip() -> (Scene, PreparedPart) {
     let mut scene = Scene::load(&root().join("scenes/clip.toml")).unwrap();
-    scene.hand.hold = 0.02;
+    scene.hand.as_mut().unwrap().hold = 0.02;
     let part = prepared(&scene);
     (scene, part)
 }
@@ -60,7 +65,7 @@ fn shape_on_processor(part: &PreparedPart, scene: &Scene) -> Shape {
 fn session_with(shape: &mut Shape, scene: &Scene, part: &PreparedPart) -> Recording {
     let mut engine = engine(scene, part);
     session::run(
-        &setup::session(scene),
+        &setup::session(scene, held(scene, part)).unwrap(),
         part,
         &mut engine,
         shape,
@@ -125,7 +130,7 @@ fn without_waiting_the_shape_arrives_later() {
         for k in 0..=50 {
             let share = 0.5 * f64::from(k) / 50.0;
             engine.step(&glamx::DPose3 {
-                translation: start.translation + share * scene.hand.travel * scene.hand.direction,
+                translation: start.translation + share * scene.drive.travel * scene.drive.direction,
                 ..start
             });
         }
@@ -150,8 +155,8 @@ fn without_waiting_the_shape_arrives_later() {
 #[test]
 fn a_real_time_session_on_a_gpu_has_the_same_forces() {
     let (mut scene, part) = clip();
-    scene.hand.hold = 0.0;
-    scene.hand.retract = false;
+    let hand = scene.hand.as_mut().unwrap();
+    (hand.hold, hand.retract) = (0.0, false);
     scene.accuracy.rates = snapin::scene::Rates::One;
     let Some(mut shape) = shape_on_gpu(&part, &scene) else {
         return;

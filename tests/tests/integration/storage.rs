@@ -30,14 +30,14 @@ fn forces(scene: &Scene, engine: &mut Engine) -> Vec<f64> {
     let start = scene.tool.pose_part_tool;
     (0..=300)
         .map(|k| {
-            let way = 0.6 * scene.hand.travel * f64::from(k) / 300.0;
+            let way = 0.6 * scene.drive.travel * f64::from(k) / 300.0;
             let target = DPose3 {
-                translation: start.translation + way * scene.hand.direction,
+                translation: start.translation + way * scene.drive.direction,
                 ..start
             };
             let report = engine.step(&target);
             assert!(report.lcp_solved && report.without_column == 0);
-            report.contact_force_on_tool().dot(scene.hand.direction)
+            report.contact_force_on_tool().dot(scene.drive.direction)
         })
         .collect()
 }
@@ -127,7 +127,7 @@ fn columns_that_come_late_are_eased_in_from_another_thread() {
     let mut engine = Engine::new(Arc::clone(&part), tool, coupling, settings).unwrap();
     let start = scene.tool.pose_part_tool;
     let at = |share: f64| DPose3 {
-        translation: start.translation + share * scene.hand.travel * scene.hand.direction,
+        translation: start.translation + share * scene.drive.travel * scene.drive.direction,
         ..start
     };
     let column = |j: usize| {

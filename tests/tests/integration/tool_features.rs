@@ -119,8 +119,8 @@ fn round_tools_have_an_engine_without_edges() {
             let start = scene.tool.pose_part_tool;
             let mut bits = Vec::new();
             for k in 0..150 {
-                let way = scene.hand.travel * f64::from(k) / 150.0;
-                let translation = start.translation + way * scene.hand.direction;
+                let way = scene.drive.travel * f64::from(k) / 150.0;
+                let translation = start.translation + way * scene.drive.direction;
                 let report = engine.step(&DPose3 {
                     translation,
                     ..start
@@ -149,7 +149,7 @@ fn the_corner_of_the_shipped_scene_feels_the_ramp_and_not_its_nodes() {
         // From the foot of the ramp at 2.2 mm to just below its crest.
         for k in 0..380 {
             let way = 1e-5 * f64::from(k);
-            let translation = start.translation + way * scene.hand.direction;
+            let translation = start.translation + way * scene.drive.direction;
             let report = engine.step(&DPose3 {
                 translation,
                 ..start
@@ -242,7 +242,7 @@ fn sharp_tools_go_over_the_hook_and_every_step_settles() {
             let mut engine = setup::engine(&scene, &prepared, tool.clone()).unwrap();
             let (mut n_contact, mut before, mut largest) = (0, DVec3::ZERO, 0.0_f64);
             for k in 0..850 {
-                let way = 1e-5 * f64::from(k) * scene.hand.direction;
+                let way = 1e-5 * f64::from(k) * scene.drive.direction;
                 let translation = start.translation + way;
                 let report = engine.step(&DPose3 {
                     translation,

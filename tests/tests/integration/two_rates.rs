@@ -24,6 +24,11 @@ fn prepared(name: &str) -> (Scene, PreparedPart) {
     (scene, part)
 }
 
+fn held(scene: &Scene, part: &PreparedPart) -> session::Held {
+    let (tool, _) = setup::tool(scene).unwrap();
+    setup::held(scene, part, &tool)
+}
+
 fn engine(scene: &Scene, part: &PreparedPart) -> Engine {
     let (tool, _) = setup::tool(scene).unwrap();
     setup::engine(scene, part, tool).unwrap()
@@ -33,7 +38,7 @@ fn engine(scene: &Scene, part: &PreparedPart) -> Engine {
 fn at(scene: &Scene, share: f64) -> DPose3 {
     let start = scene.tool.pose_part_tool;
     DPose3 {
-        translation: start.translation + share * scene.hand.travel * scene.hand.direction,
+        translation: start.translation + share * scene.drive.travel * scene.drive.direction,
         ..start
     }
 }
@@ -156,11 +161,11 @@ fn measured_gaps_lead_to_the_answer_of_a_whole_step() {
 fn session_of(rates: Rates) -> Recording {
     let (mut scene, part) = prepared("clip.toml");
     scene.accuracy.rates = rates;
-    scene.hand.hold = 0.02;
+    scene.hand.as_mut().unwrap().hold = 0.02;
     let mut engine = engine(&scene, &part);
     let mut shape = Shape::new(&part, &scene.accuracy, None).unwrap();
     session::run(
-        &setup::session(&scene),
+        &setup::session(&scene, held(&scene, &part)).unwrap(),
         &part,
         &mut engine,
         &mut shape,
@@ -235,7 +240,7 @@ fn loop_with_a_difference() -> (FastLoop, Box<Handed>, DPose3) {
     }
     let target = at(&scene, 0.4);
     let before = DPose3 {
-        translation: target.translation - 2e-4 * scene.hand.direction,
+        translation: target.translation - 2e-4 * scene.drive.direction,
         ..target
     };
     let mut freeze = |tick, at: &DPose3| {

@@ -4,18 +4,21 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
+use contact::tool::Tool;
 
 use super::{CacheArgs, print};
-use crate::evaluate::Story;
+use crate::evaluate::{Felt, Story};
 use crate::output::Staging;
 use crate::prepare::budget::duration;
-use crate::prepare::prepare;
+use crate::prepare::{PrepareOptions, PreparedPart, prepare};
 use crate::progress::Ui;
-use crate::report::{Curve, RateFacts, Run, summary, write_all};
+use crate::report::part_curve::words;
+use crate::report::{Curve, Driven, RateFacts, Run, summary, write_all};
 use crate::scene::Scene;
+use crate::session::{self, Recording};
 use crate::shape::Shape;
 use crate::study::accuracy::resolved;
-use crate::{Error, plausibility, session, setup};
+use crate::{Error, drive, plausibility, setup};
 
 #[derive(Debug, Args)]
 pub(super) struct RunArgs {
@@ -52,28 +55,29 @@ pub(super) fn run(args: &RunArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u8
     let mut doubts = plausibility::before(&scene, &prepared, &tool);
     let n_told = plausibility::tell(&doubts, ui);
     let origin = crate::origin::read(&scene, Some(prepared.loaded.mesh_hash))?;
-    let mut engine = setup::engine(&scene, &prepared, tool)?;
-    let mut spec = setup::session(&scene);
-    spec.real_time |= args.real_time;
     let progress = ui.progress();
-    let mut shape = Shape::new(&prepared, &scene.accuracy, options.cache_dir.as_deref())?;
-    let recording = session::run(&spec, &prepared, &mut engine, &mut shape, &progress)?;
-    if spec.real_time || recording.two_rates.is_some() {
-        ui.note(&recording.rates.words());
-    }
-    doubts.extend(plausibility::after(
-        &scene, &prepared, &engine, &recording, &options,
-    )?);
+    let (engine, driven) = drive::of_scene(&scene, &prepared, tool.clone(), &progress)?;
+    let felt = feel(&scene, args, &prepared, tool, &options, ui)?;
+    let ran = plausibility::Ran {
+        prepared: &prepared,
+        engine: &engine,
+        driven: &driven,
+        felt: felt.as_ref().map(|felt| &felt.recording),
+    };
+    doubts.extend(plausibility::after(&scene, &ran, &options)?);
     let story = Story {
         scene: &scene,
         prepared: &prepared,
         engine: &engine,
-        recording: &recording,
-        shape: &shape,
+        driven: &driven,
+        felt: felt.as_ref().map(|felt| Felt {
+            recording: &felt.recording,
+            shape: &felt.shape,
+            is_real_time: felt.is_real_time,
+        }),
         remarks,
         doubts,
         origin,
-        is_real_time: spec.real_time,
         picked,
     };
     let run = story.tell(&progress)?;
@@ -91,12 +95,70 @@ pub(super) fn run(args: &RunArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u8
     if args.json {
         print(out, &summary::json(&run, &curve))?;
     } else {
-        print(out, &text(&run, &curve, &shape, &target))?;
+        print(out, &text(&run, &curve, felt.as_ref(), &target))?;
     }
-    Ok(0)
+    let keeps_limits = run.driven.as_ref().is_none_or(Driven::keeps_limits);
+    Ok(if keeps_limits { 0 } else { 1 })
 }
 
-fn text(run: &Run, curve: &Curve, shape: &Shape, target: &std::path::Path) -> String {
+/// What a hand felt, and what was drawn beside it.
+struct Session {
+    recording: Recording,
+    shape: Shape,
+    is_real_time: bool,
+}
+
+/// Has the scene's hand feel the part, if there is one.
+fn feel(
+    scene: &Scene,
+    args: &RunArgs,
+    prepared: &PreparedPart,
+    tool: Tool,
+    options: &PrepareOptions,
+    ui: &Ui<'_>,
+) -> Result<Option<Session>, Error> {
+    let held = setup::held(scene, prepared, &tool);
+    let Some(mut spec) = setup::session(scene, held) else {
+        if args.real_time {
+            ui.note("--real-time: the scene has no [hand] that would keep time");
+        }
+        return Ok(None);
+    };
+    spec.real_time |= args.real_time;
+    let mut engine = setup::engine(scene, prepared, tool)?;
+    let mut shape = Shape::new(prepared, &scene.accuracy, options.cache_dir.as_deref())?;
+    let recording = session::run(&spec, prepared, &mut engine, &mut shape, &ui.progress())?;
+    if spec.real_time || recording.two_rates.is_some() {
+        ui.note(&recording.rates.words());
+    }
+    Ok(Some(Session {
+        recording,
+        shape,
+        is_real_time: spec.real_time,
+    }))
+}
+
+fn text(run: &Run, curve: &Curve, felt: Option<&Session>, target: &std::path::Path) -> String {
+    let felt = felt.map_or_else(String::new, |felt| felt_text(run, curve, felt));
+    let cached = if run.facts.from_cache {
+        " from the cache"
+    } else {
+        ""
+    };
+    format!(
+        "{}\n{}{}{felt}  prepared in           {}{cached}\n  result                {}\n",
+        run.title,
+        run.driven
+            .as_ref()
+            .map_or_else(String::new, words::terminal),
+        run.strain.text(),
+        duration(run.facts.prepare_s),
+        target.join("report.html").display(),
+    )
+}
+
+/// What the hand felt, and how long the loop took.
+fn felt_text(run: &Run, curve: &Curve, felt: &Session) -> String {
     let mut times: Vec<u64> = run
         .rows
         .iter()
@@ -111,29 +173,17 @@ fn text(run: &Run, curve: &Curve, shape: &Shape, target: &std::path::Path) -> St
             .map_or(0.0, |ns| 1e-3 * *ns as f64)
     };
     format!(
-        "{}\n  peak insertion force  {:.3} N at {:.3} mm of travel\n  snap drop             {:.3} N\n  \
-         insertion work        {:.3} mJ\n{}  coupling stiffness    {} N/m, in series with the part\n  \
-         step                  median {:.1} us, 99 % below {:.1} us, over {} steps with contact\n  \
-         {}multiply              {}\n  prepared in           {}{}\n  result                {}\n",
-        run.title,
+        "  felt by the hand      {:.3} N at {:.3} mm of travel, drop {:.3} N, coupling {} N/m in series\n  \
+         step                  median {:.1} us, 99 % below {:.1} us, over {} steps with contact\n  {}multiply              {}\n",
         curve.peak_force_n,
         1e3 * curve.travel_at_peak_m,
         curve.snap_drop_n,
-        1e3 * curve.insertion_work_j,
-        run.strain.text(),
         run.facts.coupling_stiffness.unwrap_or(f64::INFINITY),
         at(0.5),
         at(0.99),
         times.len(),
         rates_text(&run.facts.rates),
-        shape.choice().words(),
-        duration(run.facts.prepare_s),
-        if run.facts.from_cache {
-            " from the cache"
-        } else {
-            ""
-        },
-        target.join("report.html").display(),
+        felt.shape.choice().words(),
     )
 }
 

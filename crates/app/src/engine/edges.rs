@@ -17,9 +17,11 @@ use contact::plane::Plane;
 use contact::surface::Surface;
 use contact::tool::Features;
 use glam::DVec3;
+use glamx::DPose3;
 
 use super::ActiveContact;
 use super::clusters::Clusters;
+use super::held::Held;
 use super::pairs::Pairs;
 use super::part::{ContactPart, Deformed};
 use super::scratch::Known;
@@ -49,10 +51,16 @@ pub(super) struct Edges {
     place_of: Vec<u32>,
     /// Candidates that carried force when the faces were looked at last.
     active_then: Vec<u32>,
-    /// Whether the tool's pose is imposed: it cannot give way then.
-    is_imposed: bool,
-    /// m, how deep a point is in a face that cannot either.
+    /// m, how deep a point of an imposed tool is in a face that cannot give way either.
     rigid_depth: f64,
+}
+
+/// The tool in a pass.
+pub(super) struct Body<'a> {
+    pub(super) pose: DPose3,
+    pub(super) held: &'a Held,
+    /// m, point of the tool's rows.
+    pub(super) reference: DVec3,
 }
 
 /// Displacements as they are known, and the part to ask for others.
@@ -84,7 +92,6 @@ impl Edges {
         near_distance: f64,
         n_candidates: usize,
         max_rows: usize,
-        is_imposed: bool,
     ) -> Self {
         Self {
             appointments: Appointments::new(&surface, clusters),
@@ -100,7 +107,6 @@ impl Edges {
             near_distance,
             surface,
             features,
-            is_imposed,
             rigid_depth: 0.0,
         }
     }

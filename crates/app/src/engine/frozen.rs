@@ -25,10 +25,10 @@ use bytemuck::cast_slice;
 use contact::lcp;
 use contact::plane::{Plane, wrench_on_tool};
 use contact::tool::Tool;
-use device::VirtualCoupling;
 use glam::{DMat3, DVec3};
 use glamx::DPose3;
 
+use super::held::Held;
 use super::{ActiveContact, StepReport};
 
 /// Passes in a tick whose gaps are measured, at most; and the change of the wrench, relative, from which on no further
@@ -43,8 +43,7 @@ pub struct FrozenProblem {
     step: StepReport,
     target: DPose3,
     reference: DVec3,
-    coupling: Option<VirtualCoupling>,
-    compliance: Option<[[f64; 6]; 6]>,
+    held: Held,
     reach_of_rotation: f64,
     /// m, that part and tool may move before a node without a row can touch.
     margin: f64,
@@ -171,7 +170,7 @@ impl FrozenProblem {
 
     /// q where the planes move with the target.
     fn move_gaps(&mut self, target: &DPose3) {
-        let moved = VirtualCoupling::deviation(&self.target, target);
+        let moved = self.held.deviation(&self.target, target);
         let of_rows = self.q_frozen.iter().zip(&self.tool_rows);
         for (q, (q_frozen, h)) in self.q.iter_mut().zip(of_rows) {
             *q = q_frozen - dot(h, &moved);
@@ -181,8 +180,8 @@ impl FrozenProblem {
     /// Planes and q at the places of the last answer, with the tool as far from this target as from the last.
     fn measure_gaps(&mut self, target: &DPose3) {
         let m = self.planes.len();
-        let pose = VirtualCoupling::pose_from_deviation(target, &self.deviation);
-        self.reference = pose.translation;
+        let pose = self.held.pose(target, &self.deviation);
+        self.reference = self.held.reference(target, &self.deviation);
         let blocks: &[DMat3] = cast_slice(&self.blocks[..9 * m * m]);
         // By contact: columns lie side by side. First the places, in the planes' points.
         for (plane, rest) in self.planes.iter_mut().zip(&self.rest) {
@@ -265,20 +264,12 @@ impl FrozenProblem {
         report.contacts = self.active.len() as u32;
         let (force, torque) = wrench_on_tool(&self.planes, forces, self.reference);
         let wrench = [force.x, force.y, force.z, torque.x, torque.y, torque.z];
-        self.deviation = match &self.compliance {
-            Some(compliance) => compliance.map(|row| dot(&row, &wrench)),
-            None => [0.0; 6],
-        };
+        self.deviation = self.held.deviation_under(&wrench);
         self.wrench = wrench;
         report.contact_wrench_on_tool = wrench;
-        report.tool_pose = VirtualCoupling::pose_from_deviation(target, &self.deviation);
-        report.coupling_wrench_on_tool = match &self.coupling {
-            Some(coupling) => {
-                let deviation = VirtualCoupling::deviation(target, &report.tool_pose);
-                coupling.wrench_on_tool(&deviation).to_array()
-            }
-            None => wrench.map(|x| -x),
-        };
+        report.tool_pose = self.held.pose(target, &self.deviation);
+        report.coupling_wrench_on_tool =
+            self.held.wrench_on_tool(target, &report.tool_pose, &wrench);
         self.last_tool_pose = report.tool_pose;
         let of_rows = self.planes.iter().zip(&self.forces[..m]);
         let by_part: f64 = of_rows

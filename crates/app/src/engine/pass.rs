@@ -3,12 +3,11 @@
 use contact::delassus::{ComplianceBlocks, CouplingCompliance, delassus_into};
 use contact::patch::Patches;
 use contact::plane::{Plane, planes_and_rest_into, planes_into, wrench_on_tool};
-use device::VirtualCoupling;
 use glam::DVec3;
 use glamx::DPose3;
 
 use super::clock::StageClock;
-use super::edges::Positions;
+use super::edges::{Body, Positions};
 use super::part::Deformed;
 use super::scratch::Scratch;
 use super::{Engine, Stage, StepReport, rigid, state_of};
@@ -23,7 +22,7 @@ impl Engine {
         report: &mut StepReport,
     ) -> f64 {
         let mut clock = StageClock::start();
-        let reference = tool_pose.translation;
+        let reference = self.held.reference(target, &self.deviation);
         self.reference = reference;
         let part = self.part.as_ref();
         let tool = &self.tool;
@@ -109,8 +108,10 @@ impl Engine {
             report.without_column = late.sort_out(&mut self.scratch.planes, part) as u32;
         }
         report.rigid_depth = 0.0;
-        if self.coupling.is_none() {
-            report.rigid_depth = rigid::leave_out_planes(&mut self.scratch.planes, part);
+        let held = self.held;
+        if held.is_imposed() {
+            let planes = &mut self.scratch.planes;
+            report.rigid_depth = rigid::leave_out_planes(planes, part, &held, reference);
         }
         let n_rows = self.scratch.gather(part.clusters(), self.reach_of_rotation);
         // One row for each point of the tool's edges at a face.
@@ -131,7 +132,12 @@ impl Engine {
             };
             let mut positions = Positions { deformed, known };
             let sums = self.watch.sums();
-            report.dropped += edges.find(&mut positions, &pose, sums, planes, room) as u32;
+            let body = Body {
+                pose,
+                held: &held,
+                reference,
+            };
+            report.dropped += edges.find(&mut positions, &body, sums, planes, room) as u32;
             report.rigid_depth = report.rigid_depth.max(edges.rigid_depth());
         }
         let Scratch {
@@ -175,10 +181,7 @@ impl Engine {
         // gaps are open without force: then z = 0 is the exact answer.
         let is_open = q[..m].iter().all(|q| *q >= 0.0);
         if !is_open {
-            let coupling = self
-                .coupling_compliance
-                .as_ref()
-                .map(|matrix| CouplingCompliance { matrix, reference });
+            let coupling = held.compliance_about(reference);
             let w = &mut w_matrix[..m * m];
             let patches = prune.patches();
             let candidates = planes.iter().map(|plane| plane.candidate);
@@ -226,15 +229,8 @@ impl Engine {
             (force, torque) = (force + on_tool.0, torque + on_tool.1);
         }
         report.contact_wrench_on_tool = [force.x, force.y, force.z, torque.x, torque.y, torque.z];
-        if let Some(compliance) = &self.coupling_compliance {
-            self.deviation = compliance.map(|row| {
-                row.iter()
-                    .zip(&report.contact_wrench_on_tool)
-                    .map(|(c, f)| c * f)
-                    .sum()
-            });
-        }
-        let moved = VirtualCoupling::pose_from_deviation(target, &self.deviation);
+        self.deviation = held.deviation_under(&report.contact_wrench_on_tool);
+        let moved = held.pose(target, &self.deviation);
         let mut change = (moved.translation - tool_pose.translation).length()
             + self.reach_of_rotation * moved.rotation.angle_between(tool_pose.rotation);
         *tool_pose = moved;
@@ -299,7 +295,7 @@ impl Engine {
             let along = row.iter().zip(&self.deviation).map(|(h, e)| h * e).sum();
             (displacement, along)
         };
-        let of_coupling = self.coupling_compliance.as_ref();
+        let held = self.held;
         let own_of = |plane: &Plane| {
             let i = plane.candidate as usize;
             let block = match constrained {
@@ -307,14 +303,11 @@ impl Engine {
                 Some(constrained) => constrained.blocks().block(i, i),
             };
             let own = plane.normal.dot(block * plane.normal);
-            match of_coupling {
+            if own > 0.0 {
+                own
+            } else {
                 // Held along the normal: the tool alone gives way.
-                Some(compliance) if own <= 0.0 => {
-                    let h = plane.tool_row(reference);
-                    let yields = compliance.map(|row| row.iter().zip(&h).map(|(c, h)| c * h).sum());
-                    yields.iter().zip(&h).map(|(y, h): (&f64, _)| y * h).sum()
-                }
-                _ => own,
+                held.compliance_along(plane, reference)
             }
         };
         let loss = prune.learn(planes, z, motion_of, own_of, stride);

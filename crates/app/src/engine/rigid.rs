@@ -9,19 +9,26 @@ use contact::plane::Plane;
 use glam::DVec3;
 
 use super::ContactPart;
+use super::held::Held;
 
 /// Of a block's norm, the compliance along a normal below which it is none: what round-off leaves in a direction that is
 /// held.
 const NO_COMPLIANCE: f64 = 1e-12;
 
 /// Takes out the planes along whose normals the part cannot give way; how deep the tool is in the deepest of them, m.
-pub(super) fn leave_out_planes(planes: &mut Vec<Plane>, part: &ContactPart) -> f64 {
+pub(super) fn leave_out_planes(
+    planes: &mut Vec<Plane>,
+    part: &ContactPart,
+    held: &Held,
+    reference: DVec3,
+) -> f64 {
     let mut deepest = 0.0_f64;
     planes.retain(|plane| {
         let candidate = plane.candidate as usize;
         let block = part.block(candidate, candidate);
         let own = plane.normal.dot(block * plane.normal);
-        let gives_way = own > NO_COMPLIANCE * part.largest_block(plane.candidate);
+        let gives_way = own > NO_COMPLIANCE * part.largest_block(plane.candidate)
+            || held.yields_along(&plane.tool_row(reference));
         if !gives_way {
             deepest = deepest.max(-plane.gap);
         }
@@ -31,7 +38,12 @@ pub(super) fn leave_out_planes(planes: &mut Vec<Plane>, part: &ContactPart) -> f
 }
 
 /// As [`leave_out_planes`], for points of the tool at faces.
-pub(super) fn leave_out_rows(rows: &mut Vec<FaceRow>, part: &ContactPart) -> f64 {
+pub(super) fn leave_out_rows(
+    rows: &mut Vec<FaceRow>,
+    part: &ContactPart,
+    held: &Held,
+    reference: DVec3,
+) -> f64 {
     let mut deepest = 0.0_f64;
     rows.retain(|row| {
         let largest = row.shares().iter().map(|s| part.largest_block(s.0));
@@ -43,7 +55,8 @@ pub(super) fn leave_out_rows(rows: &mut Vec<FaceRow>, part: &ContactPart) -> f64
             });
             moved.sum::<DVec3>()
         };
-        let gives_way = row.normal.dot(row.displacement(moved_by)) > NO_COMPLIANCE * largest;
+        let gives_way = row.normal.dot(row.displacement(moved_by)) > NO_COMPLIANCE * largest
+            || held.yields_along(&row.tool_row(reference));
         if !gives_way {
             deepest = deepest.max(-row.gap);
         }

@@ -1,33 +1,33 @@
 //! The formulas' numbers beside the computed ones.
 
-use glam::DVec3;
-
-use crate::report::{Handbook, HandbookRow, Phase, StepRow};
+use crate::report::{Handbook, HandbookRow};
 use crate::scene::Scene;
 use crate::scene::handbook::Measured;
+use crate::session::{Record, Recording};
 
-/// What `[handbook]` says, if the scene has one. `direction`: of the insertion, of unit length;
-/// `strain`: the largest principal one.
-pub(super) fn beside(
-    scene: &Scene,
-    rows: &[StepRow],
-    direction: DVec3,
-    strain: f64,
-) -> Option<Handbook> {
+/// What `[handbook]` says, if the scene has one. `driven`: the part's own curve; `strain`: the largest
+/// principal one.
+pub(super) fn beside(scene: &Scene, driven: &Recording, strain: f64) -> Option<Handbook> {
     let prediction = scene.handbook.as_ref()?.predict(&scene.part.material);
-    let largest = |of: &dyn Fn(&StepRow) -> f64| rows.iter().map(of).fold(0.0, f64::max);
-    let pulls_out = rows.iter().any(|r| r.phase == Phase::Retract);
+    let records = &driven.records;
+    let largest = |of: &dyn Fn(&Record) -> f64| records.iter().map(of).fold(0.0, f64::max);
+    let is_way_out = |r: &Record| r.phase == device::Phase::Retract;
+    let pulls_out = records.iter().any(is_way_out);
     let measured = |what| match what {
-        Measured::Insertion => Some(largest(&|r| r.force_n)),
+        Measured::Insertion => Some(largest(&|r| match is_way_out(r) {
+            true => 0.0,
+            false => driven.resistance(r),
+        })),
         // Resistance to the way out pulls along the way in.
         Measured::Removal => pulls_out.then(|| {
-            largest(&|r| match r.phase {
-                Phase::Retract => -r.force_n,
-                _ => 0.0,
+            largest(&|r| match is_way_out(r) {
+                true => -driven.resistance(r),
+                false => 0.0,
             })
         }),
         Measured::Across => Some(largest(&|r| {
-            r.force_on_handle.reject_from(direction).length()
+            let on_body = r.wrench_on_handle.force;
+            on_body.reject_from(driven.direction).length()
         })),
         Measured::Strain => Some(strain),
     };
@@ -42,8 +42,8 @@ pub(super) fn beside(
             },
         })
     });
-    let touch = rows.iter().find(|r| r.contacts > 0);
-    let touch = touch.map_or(0.0, |r| r.travel_m);
+    let touch = records.iter().find(|r| r.report.contacts > 0);
+    let touch = touch.map_or(0.0, |r| r.travel);
     Some(Handbook {
         name: prediction.name.clone(),
         rows: compared.collect(),

@@ -21,7 +21,8 @@ pub(super) struct Moments {
 }
 
 impl Moments {
-    pub(super) fn of(recording: &Recording) -> Self {
+    /// `snap`: record of the snap's peak, which a seat may be higher than.
+    pub(super) fn of(recording: &Recording, snap: Option<usize>) -> Self {
         let records = &recording.records;
         let force: Vec<f64> = records.iter().map(|r| recording.resistance(r)).collect();
         let end = records
@@ -29,7 +30,8 @@ impl Moments {
             .position(|r| r.phase == device::Phase::Retract)
             .unwrap_or(records.len());
         let touch = records.iter().position(|r| r.report.contacts > 0);
-        let peak = touch.and_then(|_| (0..end).max_by(|&a, &b| force[a].total_cmp(&force[b])));
+        let largest = || (0..end).max_by(|&a, &b| force[a].total_cmp(&force[b]));
+        let peak = touch.and_then(|_| snap.or_else(largest));
         let crest = peak.and_then(|p| (p..end).find(|&i| force[i] <= 0.0));
         let pull = crest.and_then(|c| (c..end).min_by(|&a, &b| force[a].total_cmp(&force[b])));
         let way_out = end..records.len();

@@ -161,7 +161,7 @@ impl Story<'_> {
         sampled: &[usize],
         also: &mut dyn FnMut(&[f64], &Record),
     ) -> Result<Strained, Error> {
-        let recording = self.recording;
+        let recording = &self.driven.recording;
         let mut peaks = StrainPeaks::default();
         let mut max_rotation = 0.0f64;
         let mut seen = BTreeSet::new();

@@ -1,77 +1,40 @@
 //! Settings, checks, troubles and notes of a run, in words.
 
 use super::Story;
+use crate::effects::Verdict;
 use crate::engine::MOST_FREE;
 use crate::prepare::PreparedCompliance;
 use crate::prepare::budget::bytes;
-use crate::scene::ToolShape;
-use crate::session::Record;
+use crate::scene::{Guide, ToolShape};
+use crate::session::{Record, Recording};
 
 impl Story<'_> {
     /// What did not go as it should, in words.
     pub(super) fn troubles(&self) -> Vec<String> {
-        let records = &self.recording.records;
-        let count = |test: &dyn Fn(&Record) -> bool| records.iter().filter(|r| test(r)).count();
-        let safety = &self.recording.servo.safety;
-        let device = &self.recording.device;
-        let two_rates = self.recording.two_rates.as_ref();
-        let all = [
-            (
-                two_rates.map_or(0, |two| two.log.faded),
-                "periods in which the wrench was faded because the engine's result was too old",
-            ),
-            (
-                count(&|r| !r.report.converged) as u64,
-                "steps whose contact planes did not come to a stand",
-            ),
-            (
-                count(&|r| r.report.without_column > 0) as u64,
-                "steps in which a node near the tool could not be touched, because its column was not fetched yet or \
-                 there is no memory for more",
-            ),
-            (
-                count(&|r| !r.report.lcp_solved) as u64,
-                "steps whose contact problem was not solved to its tolerance",
-            ),
-            (
-                count(&|r| r.report.dropped > 0) as u64,
-                "steps with eight times more near nodes than accuracy.max_contacts, or nodes without a distance",
-            ),
-            (
-                count(&|r| r.report.merged_badly) as u64,
-                "steps with near nodes beyond accuracy.max_contacts whose shared rows may be wrong by more than \
-                 accuracy.merge_tolerance",
-            ),
-            (
-                count(&|r| r.report.switch_forced) as u64,
-                "steps in which freeing or constraining nodes changed the wrench beyond its bound",
-            ),
-            (
-                safety.samples_rejected(),
-                "poses of the device were refused",
-            ),
-            (
-                safety.wrenches_clamped,
-                "wrenches were cut to the device's limits",
-            ),
-            (
-                safety.wrenches_rate_limited,
-                "wrenches were slowed to the device's largest rate",
-            ),
-            (
-                device.thermally_limited,
-                "wrenches were cut to what the device bears for long",
-            ),
-        ];
-        all.into_iter()
-            .filter(|(n, _)| *n > 0)
-            .map(|(n, what)| format!("{n} {what}"))
-            .collect()
+        let mut all = of_steps(&self.driven.recording, "places of the part's own curve");
+        if let Some(felt) = &self.felt {
+            all.extend(of_steps(felt.recording, "steps"));
+            all.extend(of_session(felt.recording));
+            all.extend(felt.shape.choice().warning());
+            all.extend(felt.shape.given_up().map(str::to_owned));
+        }
+        all
+    }
+
+    /// Where the way of the drive ended early.
+    pub(super) fn stopped(&self) -> Option<String> {
+        let at = self.driven.stopped_at?;
+        Some(format!(
+            "the way ended at {:.4} of {} mm: there the tool met nodes that are held in the direction of the push, and \
+             neither gives way",
+            1e3 * at,
+            1e3 * self.scene.drive.travel,
+        ))
     }
 
     pub(super) fn settings(&self) -> Vec<(String, String)> {
         let scene = self.scene;
-        let (hand, material) = (&scene.hand, &scene.part.material);
+        let (drive, material) = (&scene.drive, &scene.part.material);
         let shape = match &scene.tool.shape {
             ToolShape::Sphere { radius } => format!("sphere, radius {} mm", 1e3 * radius),
             ToolShape::Cylinder {
@@ -110,7 +73,7 @@ impl Story<'_> {
             }
         };
         let pair = |label: &str, value: String| (label.to_owned(), value);
-        vec![
+        let mut settings = vec![
             pair("mesh", scene.part.mesh.display().to_string()),
             pair(
                 "material",
@@ -130,10 +93,63 @@ impl Story<'_> {
                 format!("{:?}", scene.part.quadrature).to_lowercase(),
             ),
             pair("tool", shape),
+            pair("held and moved", self.held_words()),
             pair(
-                "held by the handle",
-                format!("{:?}", scene.handle).to_lowercase(),
+                "drive",
+                format!(
+                    "{} mm in steps of {:.4} mm, finer where the force bends, {}{}",
+                    1e3 * drive.travel,
+                    1e3 * drive.step,
+                    match drive.guide {
+                        Guide::Axis => "along its direction only",
+                        Guide::Free =>
+                            "free across its direction and to turn, on the coupling's springs",
+                    },
+                    if drive.retract { ", and out again" } else { "" },
+                ),
             ),
+        ];
+        settings.extend(self.hand_settings());
+        settings.extend([
+            pair("accuracy", scene.accuracy.words()),
+            pair(
+                "elements",
+                format!("order {}", self.prepared.loaded.mesh.order),
+            ),
+            pair("compliance", self.compliance_words()),
+        ]);
+        if let Some(felt) = &self.felt {
+            settings.push(pair("rates", felt.recording.rates.words()));
+            settings.push(pair("multiply", felt.shape.choice().words_in_full()));
+        }
+        settings
+    }
+
+    /// Which body, and where it is held in its own frame.
+    fn held_words(&self) -> String {
+        let (held, scene) = (&self.driven.held, self.scene);
+        let (unit, scale) = scene.length_unit();
+        let grip = (held.grip / scale)
+            .to_array()
+            .map(|x| format!("{:.4}", x + 0.0));
+        let why = match scene.grip {
+            Some(_) => "as holds.grip says",
+            None => "the centre of its bounding box",
+        };
+        format!(
+            "{}, at ({}) {unit} of its file, {why}",
+            format!("{:?}", scene.handle).to_lowercase(),
+            grip.join(", "),
+        )
+    }
+
+    /// What there is of a hand.
+    fn hand_settings(&self) -> Vec<(String, String)> {
+        let (Some(hand), scene) = (&self.scene.hand, self.scene) else {
+            return Vec::new();
+        };
+        let pair = |label: &str, value: String| (label.to_owned(), value);
+        vec![
             pair(
                 "hand",
                 format!(
@@ -164,14 +180,6 @@ impl Story<'_> {
                     }
                 ),
             ),
-            pair("accuracy", scene.accuracy.words()),
-            pair("rates", self.recording.rates.words()),
-            pair(
-                "elements",
-                format!("order {}", self.prepared.loaded.mesh.order),
-            ),
-            pair("compliance", self.compliance_words()),
-            pair("multiply", self.shape.choice().words_in_full()),
         ]
     }
 
@@ -212,15 +220,23 @@ impl Story<'_> {
 
     pub(super) fn notes(&self) -> Vec<String> {
         let mut notes = vec![
-            "Travel is that of the held body in the simulation; the handle is ahead of it by the force \
-             over the stiffness of the virtual coupling, which acts in series with the part."
+            "The part's own curve is that of a testing machine: the held body goes along its path rigidly, and contact is \
+             solved for in each place from the one before."
                 .to_owned(),
             "Contact is frictionless and quasi-static, displacements are linear; strain is recovered at the skin \
              (superconvergent patch recovery), rotation is the largest at the integration points."
                 .to_owned(),
         ];
+        if self.felt.is_some() {
+            notes.push(
+                "Travel is that of the held body in the simulation; the handle of the hand is ahead of it by the force \
+                 over the stiffness of the virtual coupling, which acts in series with the part."
+                    .to_owned(),
+            );
+        }
         notes.extend(self.picked.clone());
-        if let Some(two) = &self.recording.two_rates {
+        let felt = self.felt.map(|felt| felt.recording);
+        if let Some(two) = felt.and_then(|felt| felt.two_rates.as_ref()) {
             let (median, largest) = two.differences();
             let times = two.step_us();
             notes.push(format!(
@@ -236,7 +252,7 @@ impl Story<'_> {
                 two.log.beyond_margin,
             ));
         }
-        let records = &self.recording.records;
+        let records = &self.driven.recording.records;
         if self.prepared.bubbles.is_some() {
             let most_free = records.iter().map(|r| r.report.free_nodes).max();
             let switched = records.iter().map(|r| r.report.switch_change);
@@ -255,4 +271,89 @@ impl Story<'_> {
         }
         notes
     }
+}
+
+/// An effect that the scene calls for and that is left out, in a sentence with its number.
+pub(super) fn called_for(verdict: &Verdict) -> Option<String> {
+    let number = verdict
+        .number
+        .map(|n| format!(" ({n:.2} beyond {:.2})", verdict.threshold));
+    verdict.missing.then(|| {
+        format!(
+            "this scene calls for {}, which this version does not simulate{}: {}",
+            verdict.name.replace('_', " "),
+            number.unwrap_or_default(),
+            verdict.why
+        )
+    })
+}
+
+/// Counts of what went wrong, in words, where it did.
+fn counted<'w>(all: impl IntoIterator<Item = (u64, &'w str)>, of: &str) -> Vec<String> {
+    let some = all.into_iter().filter(|(n, _)| *n > 0);
+    some.map(|(n, what)| format!("{n} {of}{what}")).collect()
+}
+
+/// Troubles of single steps. `of`: what they are called.
+fn of_steps(recording: &Recording, of: &str) -> Vec<String> {
+    let records = &recording.records;
+    let count = |test: &dyn Fn(&Record) -> bool| records.iter().filter(|r| test(r)).count() as u64;
+    let all = [
+        (
+            count(&|r| !r.report.converged),
+            " whose contact planes did not come to a stand",
+        ),
+        (
+            count(&|r| r.report.without_column > 0),
+            " in which a node near the tool could not be touched, because its column was not fetched yet or there is no \
+             memory for more",
+        ),
+        (
+            count(&|r| !r.report.lcp_solved),
+            " whose contact problem was not solved to its tolerance",
+        ),
+        (
+            count(&|r| r.report.dropped > 0),
+            " with eight times more near nodes than accuracy.max_contacts, or nodes without a distance",
+        ),
+        (
+            count(&|r| r.report.merged_badly),
+            " with near nodes beyond accuracy.max_contacts whose shared rows may be wrong by more than \
+             accuracy.merge_tolerance",
+        ),
+        (
+            count(&|r| r.report.switch_forced),
+            " in which freeing or constraining nodes changed the wrench beyond its bound",
+        ),
+    ];
+    counted(all, of)
+}
+
+/// Troubles of loop and device.
+fn of_session(recording: &Recording) -> Vec<String> {
+    let safety = &recording.servo.safety;
+    let faded = recording.two_rates.as_ref().map_or(0, |two| two.log.faded);
+    let all = [
+        (
+            faded,
+            "periods in which the wrench was faded because the engine's result was too old",
+        ),
+        (
+            safety.samples_rejected(),
+            "poses of the device were refused",
+        ),
+        (
+            safety.wrenches_clamped,
+            "wrenches were cut to the device's limits",
+        ),
+        (
+            safety.wrenches_rate_limited,
+            "wrenches were slowed to the device's largest rate",
+        ),
+        (
+            recording.device.thermally_limited,
+            "wrenches were cut to what the device bears for long",
+        ),
+    ];
+    counted(all, "")
 }

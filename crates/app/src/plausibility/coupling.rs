@@ -3,7 +3,7 @@
 use super::units::short;
 use super::warning;
 use crate::report::Warning;
-use crate::scene::Scene;
+use crate::scene::{Hand, Scene};
 use crate::session::Recording;
 
 /// K T²/m from which a handle is thrown about by a force that is held for a period, whatever damps it.
@@ -17,13 +17,13 @@ const SLOW_SHARE: f64 = 1e-2;
 
 /// The stiffness that the handle meets, coupling and part in series, is too much for a force that is new only once in a
 /// period.
-pub(super) fn too_stiff(scene: &Scene, recording: &Recording) -> Option<Warning> {
+pub(super) fn too_stiff(scene: &Scene, hand: &Hand, recording: &Recording) -> Option<Warning> {
     let stiffness = felt_stiffness(recording)?.min(scene.coupling.translational_stiffness);
     judged(
         stiffness,
         scene.device.servo_period,
-        scene.hand.mass,
-        scene.hand.damping,
+        hand.mass,
+        hand.damping,
         scene.coupling.translational_stiffness,
     )
 }

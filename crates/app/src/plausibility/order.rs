@@ -9,9 +9,8 @@ use crate::prepare::budget::{Forecast, duration};
 use crate::prepare::{PrepareOptions, PreparedPart, load, prepare};
 use crate::progress::{Progress, Ui};
 use crate::report::Warning;
-use crate::scene::{Multiply, Rates, Scene};
-use crate::shape::Shape;
-use crate::{Error, session, setup};
+use crate::scene::Scene;
+use crate::{Error, drive, setup};
 
 /// Poisson's ratio from which elements may lock.
 const NEARLY_INCOMPRESSIBLE: f64 = 0.45;
@@ -87,9 +86,7 @@ fn peak_at(scene: &Scene, order: u8, options: &PrepareOptions) -> Result<Peak, E
     let mut scene = scene.clone();
     scene.part.order = Some(order);
     scene.accuracy.budget_us = None;
-    scene.accuracy.rates = Rates::One;
-    scene.accuracy.multiply = Multiply::Cpu;
-    scene.device.real_time = false;
+    scene.drive.retract = false;
     let spec = setup::part_spec(&scene)?;
     let seconds = Forecast::of(&load(&spec)?).seconds;
     if seconds > AFFORDABLE_S {
@@ -101,13 +98,9 @@ fn peak_at(scene: &Scene, order: u8, options: &PrepareOptions) -> Result<Peak, E
     let progress: Progress = quiet.progress();
     let (tool, _) = setup::tool(&scene)?;
     let prepared = prepare(&spec, options, &quiet)?;
-    let mut engine = setup::engine(&scene, &prepared, tool)?;
-    let mut shape = Shape::new(&prepared, &scene.accuracy, options.cache_dir.as_deref())?;
-    let session = setup::session(&scene);
-    let recording = session::run(&session, &prepared, &mut engine, &mut shape, &progress)?;
-    Ok(Peak::Of(
-        super::track::Track::of(&scene, &recording).peak_force,
-    ))
+    let (_, driven) = drive::of_scene(&scene, &prepared, tool, &progress)?;
+    let track = super::track::Track::of_drive(&scene, &driven.recording);
+    Ok(Peak::Of(track.peak_force))
 }
 
 fn nearly_incompressible(nu: f64) -> String {

@@ -15,7 +15,7 @@ const LAG_SHARE: f64 = 0.05;
 
 /// The approach takes few periods of the loop.
 pub(super) fn few_periods(scene: &Scene) -> Option<Warning> {
-    let hand = &scene.hand;
+    let hand = scene.hand.as_ref()?;
     let period = scene.device.servo_period;
     let seconds = hand.travel / hand.speed;
     let periods = seconds / period;

@@ -1,6 +1,6 @@
 //! A run as the checks look at it: one line per period, plain numbers along the approach.
 
-use crate::scene::Scene;
+use crate::scene::{Hand, Scene};
 use crate::session::Recording;
 
 /// One period.
@@ -34,27 +34,16 @@ pub(super) struct Track {
 }
 
 impl Track {
-    pub(super) fn of(scene: &Scene, recording: &Recording) -> Self {
-        let start = recording.records.first().map(|r| r.handle_pose.translation);
-        let samples: Vec<Sample> = recording
-            .records
-            .iter()
-            .take_while(|r| r.phase != device::Phase::Retract)
-            .map(|r| Sample {
-                travel: r.travel,
-                handle: start.map_or(0.0, |start| {
-                    (r.handle_pose.translation - start).dot(recording.direction)
-                }),
-                force: recording.resistance(r),
-                touches: r.report.contacts > 0,
-            })
-            .collect();
-        let n_approach = recording
-            .records
-            .iter()
-            .take_while(|r| r.phase == device::Phase::Approach)
-            .count();
-        let hand = &scene.hand;
+    /// Of the part's own curve: the handle is the body, and nothing gives way.
+    pub(super) fn of_drive(scene: &Scene, driven: &Recording) -> Self {
+        let (samples, n_approach) = samples(driven);
+        let drive = &scene.drive;
+        Self::new(samples, n_approach, drive.travel, drive.step, f64::INFINITY)
+    }
+
+    /// Of what a hand felt.
+    pub(super) fn of(scene: &Scene, hand: &Hand, recording: &Recording) -> Self {
+        let (samples, n_approach) = samples(recording);
         let per_period = hand.speed * scene.device.servo_period;
         Self::new(samples, n_approach, hand.travel, per_period, hand.stiffness)
     }
@@ -82,4 +71,28 @@ impl Track {
             grip,
         }
     }
+}
+
+/// The way in, hold included, and how many of its samples approach.
+fn samples(recording: &Recording) -> (Vec<Sample>, usize) {
+    let start = recording.records.first().map(|r| r.handle_pose.translation);
+    let samples: Vec<Sample> = recording
+        .records
+        .iter()
+        .take_while(|r| r.phase != device::Phase::Retract)
+        .map(|r| Sample {
+            travel: r.travel,
+            handle: start.map_or(0.0, |start| {
+                (r.handle_pose.translation - start).dot(recording.direction)
+            }),
+            force: recording.resistance(r),
+            touches: r.report.contacts > 0,
+        })
+        .collect();
+    let n_approach = recording
+        .records
+        .iter()
+        .take_while(|r| r.phase == device::Phase::Approach)
+        .count();
+    (samples, n_approach)
 }

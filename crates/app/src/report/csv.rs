@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::data::{STAGE_NAMES, StepRow};
+use super::data::{DriveRow, STAGE_NAMES, StepRow};
 
 /// Header of `force-travel.csv`; other programs rely on it.
 pub const FORCE_TRAVEL_HEADER: &str =
@@ -31,6 +31,32 @@ pub fn force_travel(rows: &[StepRow]) -> String {
             row.contacts,
             row.pivots,
             number(row.certificate),
+        );
+    }
+    text
+}
+
+/// Header of `curve.csv`; other programs rely on it.
+pub const CURVE_HEADER: &str = "phase,travel_m,force_N,sideways_m,turn_rad,contacts,converged";
+
+/// `curve.csv`: one line per place of the driven body, in the order in which they were gone to.
+///
+/// `force_N`: along the direction, positive when the part resists the way in.
+pub fn curve(rows: &[DriveRow]) -> String {
+    let mut text = String::with_capacity(64 + rows.len() * 80);
+    text.push_str(CURVE_HEADER);
+    text.push('\n');
+    for row in rows {
+        let _ = writeln!(
+            text,
+            "{},{},{},{},{},{},{}",
+            row.phase.name(),
+            number(row.travel_m),
+            number(row.force_n),
+            number(row.sideways_m),
+            number(row.turn_rad),
+            row.contacts,
+            row.is_converged,
         );
     }
     text

@@ -3,8 +3,11 @@
 //! SI units throughout; vectors in the part's frame. Whoever runs a session fills a [`Run`] and
 //! hands it to [`write_all`](super::write_all).
 
+mod drive;
+
 use glam::DVec3;
 
+pub use self::drive::{DriveRow, Driven};
 use super::origin::Origin;
 use super::strain::StrainFacts;
 use super::summary::Percentiles;
@@ -45,7 +48,9 @@ pub struct Run {
     pub facts: Facts,
     /// The largest strains, and what the material bears.
     pub strain: StrainFacts,
-    /// One row per step, in order of time.
+    /// The part's own curve; `None` where none was driven.
+    pub driven: Option<Driven>,
+    /// What the hand felt, one row per step, in order of time; empty for a scene without a hand.
     pub rows: Vec<StepRow>,
     /// What all pictures share.
     pub part: PartDrawing,

@@ -58,7 +58,7 @@ pub fn page(run: &Run, curve: &Curve, drawings: &Drawings) -> String {
     let _ = writeln!(
         page,
         "<p class=\"headline\">{}</p>",
-        escaped(&headline(curve))
+        escaped(&headline(run, curve))
     );
     warnings::warnings(&mut page, run);
     headline::cards(&mut page, run, curve);
@@ -67,7 +67,9 @@ pub fn page(run: &Run, curve: &Curve, drawings: &Drawings) -> String {
     pictures::pictures(&mut page, run, &drawings.pictures);
     numbers::key_numbers(&mut page, run, curve);
     effects::effects(&mut page, &run.effects);
-    timing::timing(&mut page, run, &drawings.time_svg);
+    if !run.rows.is_empty() {
+        timing::timing(&mut page, run, &drawings.time_svg);
+    }
     settings::settings(&mut page, run);
     settings::notes(&mut page, run);
     reading::how_to_read(&mut page);
@@ -90,8 +92,8 @@ mod tests {
     fn page_of(run: &Run) -> String {
         let curve = Curve::of(&run.rows);
         let [wide, narrow] = [plot::Format::Wide, plot::Format::Narrow].map(|format| {
-            let mark = plot::force::peak(&curve);
-            plot::force_travel(&plot::force::felt(run), mark.as_ref(), format).unwrap()
+            let mark = plot::force::peak(run, &curve);
+            plot::force_travel(&plot::force::curves(run), mark.as_ref(), format).unwrap()
         });
         let drawings = Drawings {
             force_svg: Plot { wide, narrow },
@@ -174,7 +176,7 @@ mod tests {
     fn the_page_tells_all() {
         let page = sample_page();
         for text in [
-            "peaks at 40 N after 2 mm and drops by 50 N: the part snaps home, 0.8 mm after the peak",
+            "The part snaps: the force peaks at 42 N after 2 mm and falls by 54 N",
             "data:image/png;base64,Zm9vYmFy",
             "insertion force (N)",
             "-4.8 %",
@@ -223,7 +225,11 @@ mod tests {
 
     #[test]
     fn headlines() {
-        let quiet = headline(&Curve::default());
+        let felt_only = Run {
+            driven: None,
+            ..sample::run()
+        };
+        let quiet = headline(&felt_only, &Curve::default());
         assert!(quiet.starts_with("Nothing resisted"));
         let rising = Curve {
             peak_force_n: 12.0,
@@ -231,11 +237,11 @@ mod tests {
             peak_row_idx: Some(3),
             ..Curve::default()
         };
-        assert!(headline(&rising).contains("does not drop"));
+        assert!(headline(&felt_only, &rising).contains("does not drop"));
         let partly = Curve {
             snap_drop_n: 4.0,
             ..rising
         };
-        assert!(headline(&partly).contains("never to zero"));
+        assert!(headline(&felt_only, &partly).contains("never to zero"));
     }
 }

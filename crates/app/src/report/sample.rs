@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::data::*;
 use super::origin::{InputFile, Origin};
+use super::part_curve::{Doubts, Limits, StrainUse};
 use super::strain::{PeakKind, StrainFacts, StrainPeak};
 
 /// Force of the sample over its travel, N: up to 40 N at 2 mm, down to -10 N at 3 mm, 0 at 4 mm.
@@ -65,6 +66,48 @@ pub(super) fn rows() -> Vec<StepRow> {
         });
     }
     rows
+}
+
+/// The part's own curve of the sample: 42 N at 2 mm, -12 N at 3 mm, a seat of 60 N at 4 mm; 18 N to pull out.
+pub(super) fn drive_rows() -> Vec<DriveRow> {
+    let row = |phase, travel_m: f64, force_n: f64| DriveRow {
+        phase,
+        travel_m,
+        force_n,
+        sideways_m: 0.0,
+        turn_rad: 0.0,
+        contacts: (force_n.abs() / 2.0).ceil() as u32,
+        is_converged: true,
+        passed_m: 0.0,
+    };
+    let force = |t: f64| match t {
+        t if t < 2.0 => 21.0 * t,
+        t if t < 3.0 => 42.0 - 54.0 * (t - 2.0),
+        t if t < 3.8 => -12.0 + 15.0 * (t - 3.0),
+        t => 300.0 * (t - 3.8),
+    };
+    let mut rows: Vec<DriveRow> = (0..=200)
+        .map(|i| 0.02 * f64::from(i))
+        .map(|t| row(Phase::Approach, 1e-3 * t, force(t)))
+        .collect();
+    rows.push(row(Phase::Hold, 4e-3, force(4.0)));
+    rows.extend((0..=200).map(|i| {
+        let back = f64::from(i) / 200.0;
+        let pull = 18.0 * (back * std::f64::consts::PI).sin();
+        row(Phase::Retract, 4e-3 * (1.0 - back), -pull)
+    }));
+    rows
+}
+
+/// The driven curve of the sample, with all limits asked for, and no doubt.
+pub(super) fn driven(strain: &StrainFacts) -> Driven {
+    let asked = Limits {
+        insertion_below: Some(50.0),
+        removal_above: Some(20.0),
+        strain_below: Some(0.04),
+        strain_use: StrainUse::Once,
+    };
+    Driven::of(drive_rows(), &Doubts::default(), &asked, strain)
 }
 
 /// A clip's arm: a curved strip of `n_x` by `n_y` by `n_z` hexahedra, each cut into six tet4.
@@ -185,6 +228,19 @@ pub(super) fn run() -> Run {
         frame(&part, "first contact", 0.2),
         frame(&part, "Peak!", 1.0),
     ];
+    let strain = StrainFacts {
+        peaks: vec![StrainPeak {
+            value: 0.021,
+            error: 0.003,
+            place: [0.0, -9e-3, 0.0],
+            node_tag: 12,
+            travel_m: 1e-3,
+            force_n: 20.0,
+            kind: PeakKind::Free,
+        }],
+        permissible: Some(0.04),
+        n_moments: 40,
+    };
     Run {
         title: "Pipe clip <C-20> & co".into(),
         scene_path: "examples/clip.toml".into(),
@@ -244,19 +300,8 @@ pub(super) fn run() -> Run {
                 ..MultiplyFacts::default()
             },
         },
-        strain: StrainFacts {
-            peaks: vec![StrainPeak {
-                value: 0.021,
-                error: 0.003,
-                place: [0.0, -9e-3, 0.0],
-                node_tag: 12,
-                travel_m: 1e-3,
-                force_n: 20.0,
-                kind: PeakKind::Free,
-            }],
-            permissible: Some(0.04),
-            n_moments: 40,
-        },
+        driven: Some(driven(&strain)),
+        strain,
         rows: rows(),
         part,
         frames,

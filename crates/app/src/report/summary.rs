@@ -8,6 +8,13 @@ use super::curve::Curve;
 use super::data::{MultiplyFacts, RateFacts, Run, STAGE_NAMES, StepRow};
 use super::strain;
 
+mod driven;
+
+use driven::{CurveSummary, LimitSummary, VerdictSummary};
+
+/// Of the file. 2: verdict, limits and the part's own curve came in; no key of 1 has changed or gone.
+const SCHEMA_VERSION: u32 = 2;
+
 /// Order statistics of one stage's time, µs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Percentiles {
@@ -74,6 +81,10 @@ pub fn stage_percentiles(rows: &[StepRow]) -> Vec<(&'static str, Percentiles)> {
     reason = "keys of the file carry their unit in its own letters"
 )]
 struct Summary<'a> {
+    schema_version: u32,
+    verdict: Option<VerdictSummary<'a>>,
+    limits: Vec<LimitSummary<'a>>,
+    curve: Option<CurveSummary>,
     peak_insertion_force_N: f64,
     travel_at_peak_m: f64,
     snap_drop_N: f64,
@@ -211,10 +222,35 @@ struct EffectSummary<'a> {
     why: &'a str,
 }
 
+/// What the keys of the hand tell: what it felt, or, without a hand, the part's own curve.
+fn told(run: &Run, felt: &Curve) -> Curve {
+    let Some(driven) = run.driven.as_ref().filter(|_| run.rows.is_empty()) else {
+        return *felt;
+    };
+    let curve = &driven.curve;
+    let insertion = curve.insertion().unwrap_or_default();
+    Curve {
+        peak_force_n: insertion.force_n,
+        travel_at_peak_m: insertion.travel_m,
+        peak_row_idx: None,
+        snap_drop_n: curve.snap().map_or(0.0, |snap| snap.drop_n),
+        snap_travel_m: curve.snap().and_then(|snap| snap.gone_after_m),
+        insertion_work_j: curve.insertion_work_j,
+        net_work_j: curve.net_work_j,
+        retention_force_n: curve.removal.peak().map(|place| place.force_n),
+    }
+}
+
 /// The text of `summary.json`. Numbers that are not finite become `null`.
 pub fn json(run: &Run, curve: &Curve) -> String {
     let facts = &run.facts;
+    let curve = &told(run, curve);
+    let driven = run.driven.as_ref();
     let summary = Summary {
+        schema_version: SCHEMA_VERSION,
+        verdict: driven.map(driven::verdict),
+        limits: driven.map_or_else(Vec::new, driven::limits),
+        curve: driven.map(driven::curve),
         peak_insertion_force_N: curve.peak_force_n,
         travel_at_peak_m: curve.travel_at_peak_m,
         snap_drop_N: curve.snap_drop_n,

@@ -14,7 +14,7 @@ mod accuracy;
 mod handbook;
 
 use super::error::{SceneError, line_of, plain, suggestion};
-use super::{DeviceModel, Handle, QuadratureRule, Start, Units};
+use super::{DeviceModel, Guide, Handle, QuadratureRule, Start, StrainUse, Units};
 pub(super) use accuracy::{
     AccuracyKeys, AccuracyRaw, AdaptiveKeys, AdaptiveRaw, IterationsRaw, MethodRaw, MultiplyRaw,
     MultiplyScalarRaw, PresetRaw, RatesRaw, ScalarRaw, ToolFeaturesRaw,
@@ -25,10 +25,8 @@ pub(super) use handbook::{HandbookRaw, KindRaw};
 pub(super) mod default {
     pub(crate) const HAND_MASS: f64 = 0.5;
     pub(crate) const HAND_STIFFNESS: f64 = 2000.0;
-    pub(crate) const HAND_DAMPING: f64 = 63.0;
     pub(crate) const HAND_ROTATIONAL_INERTIA: f64 = 1e-3;
     pub(crate) const HAND_ROTATIONAL_STIFFNESS: f64 = 20.0;
-    pub(crate) const HAND_ROTATIONAL_DAMPING: f64 = 0.28;
     pub(crate) const COUPLING_TRANSLATIONAL_STIFFNESS: f64 = 1e4;
     pub(crate) const COUPLING_ROTATIONAL_STIFFNESS: f64 = 20.0;
     pub(crate) const SERVO_PERIOD: f64 = 1e-3;
@@ -36,6 +34,8 @@ pub(super) mod default {
     pub(crate) const MAX_CONTACTS: i64 = 500;
     pub(crate) const MERGE_TOLERANCE: f64 = 0.05;
     pub(crate) const FRAMES: i64 = 6;
+    /// Of the travel.
+    pub(crate) const DRIVE_STEPS: f64 = 300.0;
 }
 
 /// A value and where it stands.
@@ -119,13 +119,20 @@ pub(super) struct SceneRaw {
     /// The rigid tool that meets the part. It has its own frame, which `position` and `axis` or
     /// `rotation` place in the part's frame (the mesh's).
     pub(super) tool: At<ToolRaw>,
-    /// Which of the two bodies the hand holds; the other one is fixed in the world.
+    /// Which of the two bodies is held and moved, and where; the other one is fixed in the world.
     #[serde(default)]
     pub(super) holds: HoldsRaw,
-    /// The scripted hand of runs without a device: its target goes along `direction` at `speed`,
+    /// The way of the held body in the part's own curve: driven rigidly, in steps of travel, as by a
+    /// testing machine. The verdict comes from this curve. A scene with `[hand]` alone lends its
+    /// `direction` and `travel`; a scene without either is refused.
+    pub(super) drive: Option<At<DriveRaw>>,
+    /// What the part's own curve has to keep; a run that does not ends with exit code 1.
+    pub(super) limits: Option<LimitsRaw>,
+    /// A scripted hand that feels the part besides: its target goes along `direction` at `speed`,
     /// rests, and comes back if told; the handle follows it as a mass on a spring and a damper.
     /// The defaults are an assumption: the orders of magnitude of a firm grip, not measured ones.
-    pub(super) hand: At<HandRaw>,
+    /// Without the section nothing is felt, and there is the part's own curve only.
+    pub(super) hand: Option<At<HandRaw>>,
     /// The spring between the handle and the body that it holds. Soft hides stiff clips; the
     /// measured curve is that of clip and coupling in series.
     #[serde(default)]
@@ -428,22 +435,63 @@ pub(super) struct ToolRaw {
 #[derive(Debug, Default, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct HoldsRaw {
-    /// The body that the hand moves.
+    /// The body that is moved.
     pub(super) handle: Handle,
+    /// Where it is held, in its own frame (that of the mesh, or of the tool): the hand's springs and those of the
+    /// coupling turn it about this point. The origin of its file does not matter.
+    #[schemars(extend("x-quantity" = "length", "x-default" = "centre of its bounding box"))]
+    pub(super) grip: Option<At<Vector<3>>>,
+}
+
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct DriveRaw {
+    /// Where the held body goes, in the part's frame at the start; any length but 0.
+    #[schemars(extend("x-quantity" = "number", "x-default" = "that of [hand]"))]
+    pub(super) direction: Option<At<Vector<3>>>,
+    /// How far, above 0.
+    #[schemars(extend("x-quantity" = "length", "x-default" = "that of [hand]"))]
+    pub(super) travel: Option<At<f64>>,
+    /// Way between two places at which the force is solved for, above 0; it is halved up to six times where
+    /// the force bends.
+    #[schemars(extend("x-quantity" = "length", "x-default" = "travel / 300"))]
+    pub(super) step: Option<At<f64>>,
+    /// What the body does across `direction`.
+    #[serde(default)]
+    pub(super) guide: Guide,
+    /// Whether it is pulled out again afterwards.
+    #[schemars(extend("default" = true))]
+    pub(super) retract: Option<bool>,
+}
+
+#[derive(Debug, Default, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct LimitsRaw {
+    /// The peak force of the way in stays below this, above 0.
+    #[schemars(extend("x-quantity" = "force"))]
+    pub(super) insertion_below: Option<At<f64>>,
+    /// The largest pull on the way out is above this, above 0.
+    #[schemars(extend("x-quantity" = "force"))]
+    pub(super) removal_above: Option<At<f64>>,
+    /// The largest principal strain (0.02 is 2 %) stays below this, above 0.
+    #[schemars(extend("x-quantity" = "number"))]
+    pub(super) strain_below: Option<At<f64>>,
+    /// How often the joint is opened and closed.
+    pub(super) strain_use: StrainUse,
 }
 
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct HandRaw {
     /// Where the held body goes, in the part's frame at the start; any length but 0.
-    #[schemars(extend("x-quantity" = "number"))]
-    pub(super) direction: At<Vector<3>>,
+    #[schemars(extend("x-quantity" = "number", "x-default" = "that of [drive]"))]
+    pub(super) direction: Option<At<Vector<3>>>,
     /// Speed of the target, above 0.
     #[schemars(extend("x-quantity" = "speed"))]
     pub(super) speed: At<f64>,
     /// Way of the target, above 0.
-    #[schemars(extend("x-quantity" = "length"))]
-    pub(super) travel: At<f64>,
+    #[schemars(extend("x-quantity" = "length", "x-default" = "that of [drive]"))]
+    pub(super) travel: Option<At<f64>>,
     /// Rest at full travel.
     #[schemars(extend("x-quantity" = "time", "default" = 0.0))]
     pub(super) hold: Option<At<f64>>,
@@ -457,8 +505,8 @@ pub(super) struct HandRaw {
     /// whole force-travel curve; a softer one jumps, which is the snap that a hand feels.
     #[schemars(extend("x-quantity" = "stiffness", "default" = default::HAND_STIFFNESS))]
     pub(super) stiffness: Option<At<f64>>,
-    /// Damping of the grip; 2 sqrt(mass stiffness) is critical.
-    #[schemars(extend("x-quantity" = "damping", "default" = default::HAND_DAMPING))]
+    /// Damping of the grip. The default is critical, 2 sqrt(mass stiffness), to two digits.
+    #[schemars(extend("x-quantity" = "damping", "x-default" = "critical"))]
     pub(super) damping: Option<At<f64>>,
     /// Moment of inertia of handle and hand, the same about all axes, above 0.
     #[schemars(extend(
@@ -472,11 +520,8 @@ pub(super) struct HandRaw {
         "default" = default::HAND_ROTATIONAL_STIFFNESS
     ))]
     pub(super) rotational_stiffness: Option<At<f64>>,
-    /// Damping of the wrist.
-    #[schemars(extend(
-        "x-quantity" = "rotational_damping",
-        "default" = default::HAND_ROTATIONAL_DAMPING
-    ))]
+    /// Damping of the wrist. The default is critical, as for the grip.
+    #[schemars(extend("x-quantity" = "rotational_damping", "x-default" = "critical"))]
     pub(super) rotational_damping: Option<At<f64>>,
 }
 

@@ -24,21 +24,31 @@ radius = 0.01
 position = [0.0, 0.014, 0.005]
 axis = [0.0, 0.0, 1.0]
 
-[hand]
+[drive]
 direction = [0.0, -1.0, 0.0]
-speed = 0.02
 travel = 0.014
+"#;
+
+/// What the document adds to the example for a hand.
+const EXAMPLE_HAND: &str = r#"[hand]
+speed = 0.02
+stiffness = 6000.0
 
 [coupling]
 translational_stiffness = 2e4
 
+[limits]
+insertion_below = 20.0
+removal_above = 5.0
+strain_below = 0.02
+strain_use = "repeatedly"
+
 [effects]
-friction = "auto"
 friction_coefficient = 0.2
 "#;
 
 /// Sections that a scene must have.
-pub(super) const REQUIRED_SECTIONS: [&str; 3] = ["part", "tool", "hand"];
+pub(super) const REQUIRED_SECTIONS: [&str; 2] = ["part", "tool"];
 
 /// JSON Schema (draft 7, which most editors read) of the scene format.
 pub fn json() -> String {
@@ -53,7 +63,7 @@ pub fn markdown() -> String {
     let mut out = String::from(
         "# Scene file\n\n\
          A scene is a TOML file that says which part is held where, which tool meets it, and how \
-         the hand moves. This page is written by the program: \
+         one is pushed onto the other. This page is written by the program: \
          `cargo run --release -- scene --markdown > docs/scene.md` renews it, and \
          `cargo run --release -- scene --schema` prints a JSON Schema that editors can check \
          scenes with.\n\n\
@@ -65,6 +75,11 @@ pub fn markdown() -> String {
          ## Example\n\n```toml\n",
     );
     out.push_str(EXAMPLE);
+    out.push_str(
+        "```\n\nThat gives the part's own curve: force over travel in and out, the verdict, strain, pictures. A hand \
+         that feels it, limits to keep and what friction would add are further sections:\n\n```toml\n",
+    );
+    out.push_str(EXAMPLE_HAND);
     out.push_str(
         "```\n\nThe scenes in `scenes/` are whole ones to start from.\n\n## Top level\n\n",
     );
@@ -83,6 +98,8 @@ pub fn markdown() -> String {
         let section = &schema["properties"][name];
         let need = if REQUIRED_SECTIONS.contains(name) {
             ""
+        } else if ["drive", "hand"].contains(name) {
+            " (one of [drive] and [hand] is required)"
         } else {
             " (optional)"
         };
@@ -108,6 +125,8 @@ fn section_keys(section: &str) -> &'static [&'static str] {
         "part" => field_names::<raw::PartRaw>(),
         "tool" => field_names::<raw::ToolRaw>(),
         "holds" => field_names::<raw::HoldsRaw>(),
+        "drive" => field_names::<raw::DriveRaw>(),
+        "limits" => field_names::<raw::LimitsRaw>(),
         "hand" => field_names::<raw::HandRaw>(),
         "coupling" => field_names::<raw::CouplingRaw>(),
         "device" => field_names::<raw::DeviceRaw>(),
@@ -344,7 +363,7 @@ mod tests {
             .map(|v| v.as_str().unwrap())
             .collect();
         required.sort_unstable();
-        assert_eq!(required, ["hand", "part", "tool"]);
+        assert_eq!(required, ["part", "tool"]);
         assert!(REQUIRED_SECTIONS.iter().all(|name| required.contains(name)));
     }
 
@@ -355,7 +374,11 @@ mod tests {
         std::fs::write(dir.path().join("clip.msh"), "").unwrap();
         let path = dir.path().join("example.toml");
         let scene = crate::scene::Scene::from_bytes(EXAMPLE.into(), &path).unwrap();
+        assert!(scene.hand.is_none());
+        let both = format!("{EXAMPLE}\n{EXAMPLE_HAND}");
+        let scene = crate::scene::Scene::from_bytes(both.into(), &path).unwrap();
         assert_eq!(scene.coupling.translational_stiffness, 2e4);
+        assert_eq!(scene.hand.unwrap().travel, 0.014);
     }
 
     #[test]

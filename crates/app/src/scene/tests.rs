@@ -86,8 +86,8 @@ fn scene_has_what_is_written_and_the_defaults() {
         DVec3::new(0.0, 0.014, 0.005)
     );
     assert_eq!(scene.handle, Handle::Tool);
-    assert_eq!(scene.hand.direction, DVec3::NEG_Y);
-    let hand = &scene.hand;
+    let hand = scene.hand.as_ref().unwrap();
+    assert_eq!(hand.direction, DVec3::NEG_Y);
     assert_eq!(
         (hand.mass, hand.stiffness, hand.damping),
         (0.5, 2000.0, 63.0)
@@ -124,7 +124,6 @@ fn scene_has_what_is_written_and_the_defaults() {
         }
     );
     assert_eq!(scene.handbook, None);
-    assert_eq!(scene.steps(), 700);
 }
 
 /// The same scene in mm is the same scene.
@@ -146,14 +145,15 @@ coupling = { translational_stiffness = 10, rotational_stiffness = 2e4 }
     near(mm.part.material.young_modulus, 2.7e9);
     near(mm.part.material.density.unwrap(), 1410.0);
     near(mm.tool.pose_part_tool.translation.y, 0.014);
-    near(mm.hand.speed, si.hand.speed);
-    near(mm.hand.travel, si.hand.travel);
-    near(mm.hand.mass, si.hand.mass);
-    near(mm.hand.stiffness, si.hand.stiffness);
-    near(mm.hand.damping, si.hand.damping);
-    near(mm.hand.rotational_inertia, si.hand.rotational_inertia);
-    near(mm.hand.rotational_stiffness, si.hand.rotational_stiffness);
-    near(mm.hand.rotational_damping, si.hand.rotational_damping);
+    let [mm_hand, si_hand] = [&mm, &si].map(|scene| scene.hand.as_ref().unwrap());
+    near(mm_hand.speed, si_hand.speed);
+    near(mm_hand.travel, si_hand.travel);
+    near(mm_hand.mass, si_hand.mass);
+    near(mm_hand.stiffness, si_hand.stiffness);
+    near(mm_hand.damping, si_hand.damping);
+    near(mm_hand.rotational_inertia, si_hand.rotational_inertia);
+    near(mm_hand.rotational_stiffness, si_hand.rotational_stiffness);
+    near(mm_hand.rotational_damping, si_hand.rotational_damping);
     near(
         mm.coupling.translational_stiffness,
         si.coupling.translational_stiffness,
@@ -290,7 +290,7 @@ fn refusals_name_line_key_and_mend() {
         ),
         (
             read(&CLIP[..CLIP.find("[hand]").unwrap()]),
-            "clip.toml:1: section [hand] is missing; docs/scene.md has an example",
+            "clip.toml:1: section [drive] is missing: nothing says where the held body goes; add `[drive]` with `direction = [0.0, -1.0, 0.0]` and `travel = ...`",
         ),
         (
             with("0.02", "\"fast\""),
@@ -799,4 +799,46 @@ fn shipped_scenes_are_valid() {
         }
     }
     assert!(n_scenes >= 2);
+}
+
+/// `[drive]` and `[hand]` lend each other the way.
+#[test]
+fn drive_and_hand_lend_each_other_direction_and_travel() {
+    let hand = CLIP.find("[hand]").unwrap();
+    let alone = |section: &str| read(format!("{}{section}", &CLIP[..hand])).unwrap();
+    let lent = read(CLIP).unwrap();
+    let of_hand = lent.hand.as_ref().unwrap();
+    assert_eq!(lent.drive.travel, of_hand.travel);
+    assert_eq!(lent.drive.direction, of_hand.direction);
+    assert_eq!(lent.drive.step, of_hand.travel / 300.0);
+    assert!(lent.drive.retract && lent.drive.guide == Guide::Axis);
+    let drive = "[drive]\ndirection = [0, 0, 3]\ntravel = 0.002\nstep = 1e-5\nguide = \"free\"\nretract = false\n";
+    let scene = alone(drive);
+    assert!(scene.hand.is_none());
+    assert_eq!(
+        (scene.drive.direction, scene.drive.travel),
+        (DVec3::Z, 2e-3)
+    );
+    assert_eq!((scene.drive.step, scene.drive.guide), (1e-5, Guide::Free));
+    assert!(!scene.drive.retract);
+    let both = alone(&format!("{drive}[hand]\nspeed = 0.01\nstiffness = 500\n"));
+    let of_drive = both.hand.unwrap();
+    assert_eq!((of_drive.direction, of_drive.travel), (DVec3::Z, 2e-3));
+    // 2 sqrt(0.5 kg 500 N/m), to two digits.
+    assert_eq!(of_drive.damping, 32.0);
+}
+
+#[test]
+fn limits_and_the_grip_are_in_the_scenes_units() {
+    let text = format!("units = \"mm-N-MPa\"\n{CLIP}");
+    let more = "[limits]\ninsertion_below = 9\nstrain_below = 0.02\nstrain_use = \"repeatedly\"\n\
+                [holds]\ngrip = [1, 2, 3]\n";
+    let scene = read(format!("{text}{more}")).unwrap();
+    assert_eq!(scene.limits.insertion_below, Some(9.0));
+    assert_eq!(
+        (scene.limits.removal_above, scene.limits.strain_below),
+        (None, Some(0.02))
+    );
+    assert_eq!(scene.limits.strain_use, StrainUse::Repeatedly);
+    assert!((scene.grip.unwrap() - DVec3::new(1e-3, 2e-3, 3e-3)).length() < 1e-18);
 }

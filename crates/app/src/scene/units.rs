@@ -11,6 +11,7 @@ pub(super) enum Quantity {
     Mass,
     Density,
     Pressure,
+    Force,
     Stiffness,
     Damping,
     RotationalInertia,
@@ -24,13 +25,14 @@ use Quantity::*;
 
 /// Names as the schema writes them, units in SI, units in mm-N-MPa, factor from the latter.
 /// mm-N-MPa is the consistent set that mesh programs use: with mm, N and s the mass is in t.
-const TABLE: [(Quantity, &str, &str, &str, f64); 13] = [
+const TABLE: [(Quantity, &str, &str, &str, f64); 14] = [
     (Length, "length", "m", "mm", 1e-3),
     (Time, "time", "s", "s", 1.0),
     (Speed, "speed", "m/s", "mm/s", 1e-3),
     (Mass, "mass", "kg", "t", 1e3),
     (Density, "density", "kg/m³", "t/mm³", 1e12),
     (Pressure, "pressure", "Pa", "MPa", 1e6),
+    (Force, "force", "N", "N", 1.0),
     (Stiffness, "stiffness", "N/m", "N/mm", 1e3),
     (Damping, "damping", "N s/m", "N s/mm", 1e3),
     (
@@ -94,6 +96,7 @@ mod tests {
             (Mass, t),
             (Density, t / mm.powi(3)),
             (Pressure, newton / mm.powi(2)),
+            (Force, newton),
             (Stiffness, newton / mm),
             (Damping, newton / mm),
             (RotationalInertia, t * mm.powi(2)),

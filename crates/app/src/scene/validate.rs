@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod handbook;
+mod motion;
 
 use std::path::{Path, PathBuf};
 
@@ -12,8 +13,8 @@ use super::error::{SceneError, line_of, plain};
 use super::raw::{self, At, EffectRaw, ShapeRaw, Vector, default};
 use super::units::{Quantity, to_si};
 use super::{
-    Coupling, Device, EffectChoice, Effects, FieldOf, Fixed, GroupName, Hand, Material, Output,
-    Part, Scene, Tool, ToolShape, Units,
+    Coupling, Device, EffectChoice, Effects, FieldOf, Fixed, GroupName, Material, Output, Part,
+    Scene, Tool, ToolShape, Units,
 };
 
 /// Servo periods in one run: 10 000 s at 1 kHz. More is a slip of the units, and would fill disks.
@@ -30,6 +31,7 @@ pub(super) fn scene(raw: raw::SceneRaw, source: String, path: &Path) -> Result<S
         raw.units,
     );
     let device = check.device(&raw.device)?;
+    let (drive, hand) = check.motion(raw.drive.as_ref(), raw.hand.as_ref(), &device)?;
     let part = check.part(raw.part, &raw.accuracy.0)?;
     let handbook = raw
         .handbook
@@ -46,7 +48,10 @@ pub(super) fn scene(raw: raw::SceneRaw, source: String, path: &Path) -> Result<S
         handbook,
         tool: check.tool(&raw.tool)?,
         handle: raw.holds.handle,
-        hand: check.hand(&raw.hand, &device)?,
+        grip: check.grip(&raw.holds)?,
+        drive,
+        hand,
+        limits: check.limits(raw.limits.as_ref())?,
         coupling: check.coupling(&raw.coupling)?,
         accuracy: check.accuracy(&raw.accuracy.0, device.servo_period)?,
         device,
@@ -437,72 +442,6 @@ impl Check<'_> {
             }
             (None, None) => Ok(DQuat::IDENTITY),
         }
-    }
-
-    fn hand(&self, at: &At<raw::HandRaw>, device: &Device) -> Result<Hand, SceneError> {
-        use Range::{NotNegative, Positive};
-        let raw = &at.value;
-        let or = |key, at: &Option<At<f64>>, default, quantity, range| {
-            self.number_or(key, at.as_ref(), default, quantity, range)
-        };
-        let hand = Hand {
-            direction: self.direction("direction", &raw.direction)?,
-            speed: self.number("speed", &raw.speed, Quantity::Speed, Positive)?,
-            travel: self.number("travel", &raw.travel, Quantity::Length, Positive)?,
-            hold: or("hold", &raw.hold, 0.0, Quantity::Time, NotNegative)?,
-            retract: raw.retract,
-            mass: or(
-                "mass",
-                &raw.mass,
-                default::HAND_MASS,
-                Quantity::Mass,
-                Positive,
-            )?,
-            stiffness: or(
-                "stiffness",
-                &raw.stiffness,
-                default::HAND_STIFFNESS,
-                Quantity::Stiffness,
-                Positive,
-            )?,
-            damping: or(
-                "damping",
-                &raw.damping,
-                default::HAND_DAMPING,
-                Quantity::Damping,
-                NotNegative,
-            )?,
-            rotational_inertia: or(
-                "rotational_inertia",
-                &raw.rotational_inertia,
-                default::HAND_ROTATIONAL_INERTIA,
-                Quantity::RotationalInertia,
-                Positive,
-            )?,
-            rotational_stiffness: or(
-                "rotational_stiffness",
-                &raw.rotational_stiffness,
-                default::HAND_ROTATIONAL_STIFFNESS,
-                Quantity::RotationalStiffness,
-                Positive,
-            )?,
-            rotational_damping: or(
-                "rotational_damping",
-                &raw.rotational_damping,
-                default::HAND_ROTATIONAL_DAMPING,
-                Quantity::RotationalDamping,
-                NotNegative,
-            )?,
-        };
-        let steps = hand.duration() / device.servo_period;
-        if steps > MOST_STEPS {
-            let what = format!(
-                "travel, speed and hold make {steps:.1e} steps of {} s, more than {MOST_STEPS:e}",
-                device.servo_period
-            );
-            return Err(self.error(raw.speed.offset, what, "move faster or hold for less"));
-        }
-        Ok(hand)
     }
 
     fn coupling(&self, raw: &raw::CouplingRaw) -> Result<Coupling, SceneError> {

@@ -2,11 +2,9 @@
 
 use std::time::Instant;
 
-use glamx::DPose3;
-
+use super::SessionSpec;
 use super::fast::FastLog;
 use super::slow::SlowStep;
-use super::{Holds, SessionSpec};
 use crate::engine::Engine;
 use crate::report::summary::Percentiles;
 
@@ -50,6 +48,15 @@ pub struct TwoRates {
 }
 
 impl ChosenRates {
+    /// Of a drive, which has no loop.
+    pub(crate) fn driven() -> Self {
+        Self {
+            every: None,
+            is_beside: false,
+            why: "there is no loop".to_owned(),
+        }
+    }
+
     /// In a sentence.
     pub fn words(&self) -> String {
         let what = match self.every {
@@ -118,14 +125,7 @@ fn rehearse(spec: &SessionSpec, engine: &mut Engine) -> (Option<u64>, String) {
     engine.reset();
     for k in 0..=n {
         let shift = spec.travel * k as f64 / n as f64 * spec.direction.normalize();
-        let translation = match spec.holds {
-            Holds::Tool => spec.tool_pose.translation + shift,
-            Holds::Part => spec.tool_pose.translation - shift,
-        };
-        let target = DPose3 {
-            translation,
-            ..spec.tool_pose
-        };
+        let target = spec.held.target(&spec.held.along(shift));
         let begun = Instant::now();
         let report = engine.step(&target);
         let step_ns = begun.elapsed().as_nanos() as u64;

@@ -2,13 +2,13 @@
 
 use std::time::Instant;
 
-use device::{HandleState, Script, ServoReport, Simulated, SimulatedEvents, Wrench};
+use device::{HandleState, Script, ServoReport, Simulated, Wrench};
 use glam::DVec3;
 use glamx::DPose3;
 
 use super::fast::Tick;
 use super::rates::{ChosenRates, TwoRates};
-use super::{Holds, Record, Recording, SessionSpec, timed_display};
+use super::{Entry, Recording, SessionSpec, timed_display};
 use crate::Error;
 use crate::engine::{ActiveContact, Engine, Stage, StepReport};
 use crate::shape::Shape;
@@ -23,8 +23,6 @@ pub(super) struct Solved {
 pub(super) struct Recorder<'a> {
     spec: &'a SessionSpec,
     script: Script,
-    /// Of the handle.
-    start: DPose3,
     recording: Recording,
 }
 
@@ -33,41 +31,29 @@ impl<'a> Recorder<'a> {
     pub(super) fn new(
         spec: &'a SessionSpec,
         script: Script,
-        start: DPose3,
         n_periods: u64,
         rates: ChosenRates,
     ) -> Self {
         Self {
             spec,
             script,
-            start,
-            recording: Recording {
-                records: Vec::with_capacity(n_periods as usize),
-                direction: spec.direction.normalize(),
-                servo: ServoReport::default(),
-                device: SimulatedEvents::default(),
-                max_surface_displacement: 0.0,
-                rates,
-                two_rates: None,
-                contacts: Vec::with_capacity(64 * n_periods as usize),
-                bubbles: Vec::new(),
-            },
+            recording: Recording::with_room(spec.direction, n_periods as usize, rates),
         }
     }
 
     /// Pose of the tool that the handle asks for, in the part's frame.
     pub(super) fn target(&self, handle: &HandleState) -> DPose3 {
-        target(self.spec, &handle.pose)
+        self.spec.held.target(&handle.pose)
     }
 
     /// The same at the start.
     pub(super) fn start_target(&self) -> DPose3 {
-        target(self.spec, &self.start)
+        self.spec.held.target(&self.spec.held.start())
     }
 
     /// On the handle about its point, world.
     pub(super) fn wrench_on_handle(&self, handle: &HandleState, report: &StepReport) -> Wrench {
-        wrench_on_handle(self.spec, handle, report)
+        self.spec.held.wrench_on_handle(&handle.pose, report)
     }
 
     /// A tick of the fast loop and its record. `solve` is given what makes a wrench on the handle of a report.
@@ -77,8 +63,8 @@ impl<'a> Recorder<'a> {
         solve: impl FnOnce(&dyn Fn(&StepReport) -> Wrench) -> (Tick, &'c [ActiveContact]),
     ) -> Wrench {
         let begun = Instant::now();
-        let spec = self.spec;
-        let (answer, contacts) = solve(&|report| wrench_on_handle(spec, handle, report));
+        let held = &self.spec.held;
+        let (answer, contacts) = solve(&|report| held.wrench_on_handle(&handle.pose, report));
         let step_ns = begun.elapsed().as_nanos() as u64;
         let mut report = answer.report;
         report.stage_ns[Stage::Lcp as usize] = step_ns;
@@ -98,35 +84,20 @@ impl<'a> Recorder<'a> {
         solved: &Solved,
         contacts: &[ActiveContact],
     ) {
-        let held = match self.spec.holds {
-            Holds::Tool => solved.report.tool_pose,
-            Holds::Part => self.spec.tool_pose * solved.report.tool_pose.inverse(),
-        };
-        let recording = &mut self.recording;
-        let contacts_from = recording.contacts.len();
-        recording.contacts.extend_from_slice(contacts);
-        recording.records.push(Record {
-            step: recording.records.len() as u64,
+        let entry = Entry {
             time_s: handle.time_s,
             phase: self.script.phase(handle.time_s),
             handle_pose: handle.pose,
-            travel: (held.translation - self.start.translation).dot(recording.direction),
             wrench_on_handle: solved.wrench_on_handle,
-            report: solved.report,
             step_ns: solved.step_ns,
-            multiply_ns: None,
-            contacts: contacts_from..recording.contacts.len(),
-            bubbles: recording.bubbles.len()..recording.bubbles.len(),
-        });
+        };
+        self.recording
+            .push(&entry, &self.spec.held, &solved.report, contacts);
     }
 
     /// Adds the free interface nodes of a constrained part to the last record.
     pub(super) fn push_bubbles(&mut self, amplitudes: &[(u32, DVec3)]) {
-        let recording = &mut self.recording;
-        recording.bubbles.extend_from_slice(amplitudes);
-        if let Some(last) = recording.records.last_mut() {
-            last.bubbles.end = recording.bubbles.len();
-        }
+        self.recording.push_bubbles(amplitudes);
     }
 
     /// What the display would do between two steps, and its time, ns.
@@ -164,32 +135,5 @@ impl<'a> Recorder<'a> {
         self.recording.servo = *servo;
         self.recording.device = device.events();
         self.recording
-    }
-}
-
-fn target(spec: &SessionSpec, handle: &DPose3) -> DPose3 {
-    match spec.holds {
-        Holds::Tool => *handle,
-        Holds::Part => handle.inverse() * spec.tool_pose,
-    }
-}
-
-fn wrench_on_handle(spec: &SessionSpec, handle: &HandleState, report: &StepReport) -> Wrench {
-    match spec.holds {
-        // The handle feels the opposite of what the coupling exerts on the tool.
-        Holds::Tool => {
-            let on_tool = Wrench::from_array(&report.coupling_wrench_on_tool);
-            (-on_tool).about(report.tool_pose.translation, handle.pose.translation)
-        }
-        // The part feels the opposite of the tool, at the tool, turned into the world.
-        Holds::Part => {
-            let part = spec.tool_pose * report.tool_pose.inverse();
-            let on_tool = Wrench::from_array(&report.contact_wrench_on_tool);
-            let on_part = Wrench::new(
-                part.rotation * -on_tool.force,
-                part.rotation * -on_tool.torque,
-            );
-            on_part.about(spec.tool_pose.translation, handle.pose.translation)
-        }
     }
 }

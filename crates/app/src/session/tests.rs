@@ -33,10 +33,15 @@ fn engine() -> Engine {
 
 pub(super) fn spec() -> SessionSpec {
     SessionSpec {
-        holds: Holds::Tool,
-        tool_pose: DPose3::from_translation(DVec3::new(0.0, 0.0, 4.99e-3)),
-        may_overlap: true,
-        length_unit: ("m", 1.0),
+        held: Held {
+            holds: Holds::Tool,
+            grip: DVec3::ZERO,
+            tool_pose: DPose3::from_translation(DVec3::new(0.0, 0.0, 4.99e-3)),
+        },
+        clearance: Clearance {
+            may_overlap: true,
+            length_unit: ("m", 1.0),
+        },
         direction: DVec3::NEG_Z,
         speed: 1e-3,
         travel: 1e-4,
@@ -69,7 +74,7 @@ fn run_with(
 ) -> (Result<fast::FastLog, Error>, Recording) {
     let spec = spec();
     let script = Script::new(&Insertion {
-        start: spec.tool_pose,
+        start: spec.held.tool_pose,
         direction: spec.direction,
         speed: spec.speed,
         travel: spec.travel,
@@ -83,13 +88,19 @@ fn run_with(
     let mut servo = Servo::new(AsFastAsPossible::new(1e-3).unwrap(), settings).unwrap();
     let rates = choose(&spec, engine);
     let mut session = Session {
-        recorder: Recorder::new(&spec, script, spec.tool_pose, N_PERIODS, rates),
+        recorder: Recorder::new(&spec, script, N_PERIODS, rates),
         device,
         n_periods: N_PERIODS,
         progress,
     };
     let mut first = slow::empty(engine);
-    solve_and_freeze(engine, 0, &spec.tool_pose, &spec.tool_pose, &mut first);
+    solve_and_freeze(
+        engine,
+        0,
+        &spec.held.tool_pose,
+        &spec.held.tool_pose,
+        &mut first,
+    );
     let boxes = std::array::from_fn(|_| slow::empty(engine));
     let fast = FastSettings {
         period_s: 1e-3,
@@ -150,7 +161,7 @@ fn an_engine_that_ends_is_an_error_and_the_device_is_released() {
 #[test]
 fn an_engine_beside_the_loop_answers_the_newest_target() {
     let mut engine = engine();
-    let mut last = spec().tool_pose;
+    let mut last = spec().held.tool_pose;
     let mut ticks = Vec::new();
     let engine = &mut engine;
     let mut other = self::engine();

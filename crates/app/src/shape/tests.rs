@@ -13,16 +13,17 @@ fn an_adapter_that_is_given_up_in_a_run_is_told_and_changes_no_force() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/clip.toml");
     let mut scene = Scene::load(&path).unwrap();
     scene.accuracy.multiply = Multiply::Cpu;
-    scene.hand.hold = 0.0;
-    scene.hand.retract = false;
+    let hand = scene.hand.as_mut().unwrap();
+    (hand.hold, hand.retract) = (0.0, false);
     let mut unseen = std::io::sink();
     let ui = Ui::new(&mut unseen, false);
     let spec = setup::part_spec(&scene).unwrap();
     let prepared = prepare(&spec, &PrepareOptions::default(), &ui).unwrap();
     let run = |shape: &mut Shape| -> Recording {
         let (tool, _) = setup::tool(&scene).unwrap();
+        let held = setup::held(&scene, &prepared, &tool);
         let mut engine = setup::engine(&scene, &prepared, tool).unwrap();
-        let spec = setup::session(&scene);
+        let spec = setup::session(&scene, held).unwrap();
         session::run(&spec, &prepared, &mut engine, shape, &fem::Silent).unwrap()
     };
     let mut shape = Shape::new(&prepared, &scene.accuracy, None).unwrap();

@@ -175,12 +175,12 @@ pub fn run(
     plausibility::tell(&plausibility::of_part(scene, &loaded), ui);
     let scales = Scales {
         direction: match scene.handle {
-            Handle::Tool => scene.hand.direction,
-            Handle::Part => -scene.hand.direction,
+            Handle::Tool => scene.drive.direction,
+            Handle::Part => -scene.drive.direction,
         }
         .to_array(),
         lever: part_extent(&loaded.mesh),
-        travel: scene.hand.travel,
+        travel: scene.drive.travel,
     };
     runner.run(&own)?;
     let reference = match reference_file {

@@ -10,7 +10,7 @@ use glamx::DPose3;
 use super::super::ActiveContact;
 use super::super::rigid::leave_out_rows;
 use super::super::watch::Sums;
-use super::{Edges, Positions};
+use super::{Body, Edges, Positions};
 
 /// Of the near distance: a point that is less deep behind several faces is at all of them, as in a hollow corner of the
 /// part. 6 to 40 times what counts as standing still in the shipped scenes.
@@ -32,11 +32,12 @@ impl Edges {
     pub(in crate::engine) fn find(
         &mut self,
         positions: &mut Positions<'_>,
-        tool_pose: &DPose3,
+        body: &Body<'_>,
         sums: Sums<'_>,
         planes: &[Plane],
         room: usize,
     ) -> usize {
+        let tool_pose = &body.pose;
         self.memory.begin_pass();
         self.rows.clear();
         if sums.n_starts != self.appointments.n_starts {
@@ -69,8 +70,8 @@ impl Edges {
                 |row: &FaceRow| row.shares().iter().all(|(c, _)| part.is_taken_in(*c));
             self.rows.retain(has_columns);
         }
-        if self.is_imposed {
-            self.rigid_depth = leave_out_rows(&mut self.rows, part);
+        if body.held.is_imposed() {
+            self.rigid_depth = leave_out_rows(&mut self.rows, part, body.held, body.reference);
         }
         self.memory.remember(&self.rows);
         self.list_involved(positions, planes);

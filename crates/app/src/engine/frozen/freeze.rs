@@ -1,6 +1,6 @@
 //! From a step to its frozen problem: rows, gaps, operator and its factor.
 
-use contact::delassus::{ComplianceBlocks, CouplingCompliance, delassus_into};
+use contact::delassus::{ComplianceBlocks, delassus_into};
 use contact::lcp;
 use contact::plane::planes_and_rest_into;
 use glam::DVec3;
@@ -39,8 +39,7 @@ impl Engine {
             step: StepReport::at(&identity),
             target: identity,
             reference: DVec3::ZERO,
-            coupling: self.coupling,
-            compliance: self.coupling_compliance,
+            held: self.held,
             reach_of_rotation: self.reach_of_rotation,
             margin: 0.0,
             tool: self.tool.clone(),
@@ -209,10 +208,7 @@ impl Engine {
         for (warm, plane) in warm.iter_mut().zip(&*planes) {
             *warm = self.scratch.was_active[plane.candidate as usize];
         }
-        let coupling = self
-            .coupling_compliance
-            .as_ref()
-            .map(|matrix| CouplingCompliance { matrix, reference });
+        let coupling = self.held.compliance_about(reference);
         let m = planes.len();
         let w = &mut w_matrix[..m * m];
         let pairs = &mut self.scratch.pairs;

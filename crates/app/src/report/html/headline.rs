@@ -1,15 +1,19 @@
-//! The result in words and in six large numbers.
+//! The result in words and in a few large numbers.
 
 use std::fmt::Write as _;
 
 use super::super::curve::Curve;
 use super::super::data::Run;
+use super::super::part_curve::{Removal, words};
 use super::super::plot::short;
 use super::super::strain::StrainPeak;
 use super::text::escaped;
 
-/// The result in two sentences, plain text.
-pub fn headline(curve: &Curve) -> String {
+/// The result in a few sentences, plain text: that of the part's own curve, or of the felt one where there is no other.
+pub fn headline(run: &Run, curve: &Curve) -> String {
+    if let Some(driven) = &run.driven {
+        return words::headline(driven);
+    }
     if curve.peak_row_idx.is_none() {
         return "Nothing resisted the hand: the tool did not touch the part, or pushed it nowhere."
             .to_owned();
@@ -44,23 +48,41 @@ pub fn headline(curve: &Curve) -> String {
 
 /// The numbers that are looked for first.
 pub(super) fn cards(page: &mut String, run: &Run, curve: &Curve) {
-    let snaps = if curve.snaps_home() { "yes" } else { "no" };
-    let pull = curve
-        .retention_force_n
-        .map_or("not pulled".into(), |f| format!("{} N", short(f)));
-    page.push_str("<div class=\"cards\">");
-    for (value, label) in [
-        (
-            format!("{} N", short(curve.peak_force_n)),
-            "peak insertion force",
+    let newtons = |force: f64| format!("{} N", short(force));
+    let (verdict, peak, travel, drop, removal) = match &run.driven {
+        Some(driven) => {
+            let part = &driven.curve;
+            let insertion = part.insertion().unwrap_or_default();
+            (
+                driven.verdict.outcome.name(),
+                insertion.force_n,
+                insertion.travel_m,
+                part.snap().map_or(0.0, |snap| snap.drop_n),
+                match part.removal {
+                    Removal::NotPulled => "not pulled".to_owned(),
+                    Removal::StillHeld(_) => "still held".to_owned(),
+                    Removal::Out(place) => newtons(place.force_n),
+                },
+            )
+        }
+        None => (
+            if curve.snaps_home() {
+                "snaps"
+            } else {
+                "does not snap"
+            },
+            curve.peak_force_n,
+            curve.travel_at_peak_m,
+            curve.snap_drop_n,
+            curve.retention_force_n.map_or("not pulled".into(), newtons),
         ),
-        (
-            format!("{} mm", short(curve.travel_at_peak_m * 1e3)),
-            "travel at the peak",
-        ),
-        (format!("{} N", short(curve.snap_drop_n)), "snap drop"),
-        (snaps.to_owned(), "snaps home"),
-        (pull, "retention force"),
+    };
+    let mut cards = vec![
+        (verdict.to_owned(), "verdict"),
+        (newtons(peak), "peak insertion force"),
+        (format!("{} mm", short(travel * 1e3)), "travel at the peak"),
+        (newtons(drop), "snap drop"),
+        (removal, "peak removal force"),
         (
             run.strain
                 .governing()
@@ -71,7 +93,11 @@ pub(super) fn cards(page: &mut String, run: &Run, curve: &Curve) {
             run.strain.safety_once().map_or("not given".into(), short),
             "permissible over largest strain",
         ),
-    ] {
+    ];
+    let limits = run.driven.iter().flat_map(|driven| &driven.limits);
+    cards.extend(limits.map(|limit| (limit.state.name().to_owned(), limit.key)));
+    page.push_str("<div class=\"cards\">");
+    for (value, label) in cards {
         let _ = write!(
             page,
             "<div class=\"card\"><b>{}</b><span>{label}</span></div>",

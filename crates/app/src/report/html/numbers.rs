@@ -11,8 +11,6 @@ use super::blocks::{labelled, section};
 pub(super) fn key_numbers(page: &mut String, run: &Run, curve: &Curve) {
     section(page, "Key numbers");
     let facts = &run.facts;
-    let millimetres = |m: f64| format!("{} mm", short(m * 1e3));
-    let newtons = |n: f64| format!("{} N", short(n));
     let order = match facts.order {
         1 => "linear".to_owned(),
         2 => "quadratic".to_owned(),
@@ -24,31 +22,7 @@ pub(super) fn key_numbers(page: &mut String, run: &Run, curve: &Curve) {
     } else {
         ""
     };
-    let contacts = run.rows.iter().map(|row| row.contacts).max().unwrap_or(0);
     let rows = [
-        ("peak insertion force", newtons(curve.peak_force_n)),
-        ("travel at the peak", millimetres(curve.travel_at_peak_m)),
-        ("snap drop", newtons(curve.snap_drop_n)),
-        (
-            "snap travel",
-            curve
-                .snap_travel_m
-                .map_or("does not snap".into(), millimetres),
-        ),
-        (
-            "insertion work",
-            format!("{} mJ", short(curve.insertion_work_j * 1e3)),
-        ),
-        (
-            "net work of the whole insertion",
-            format!("{} mJ", short(curve.net_work_j * 1e3)),
-        ),
-        (
-            "retention force",
-            curve
-                .retention_force_n
-                .map_or("not pulled out".into(), newtons),
-        ),
         (
             "largest principal strain",
             run.strain
@@ -64,14 +38,6 @@ pub(super) fn key_numbers(page: &mut String, run: &Run, curve: &Curve) {
             format!("{}\u{b0}", short(facts.max_rotation_deg)),
         ),
         (
-            "coupling stiffness",
-            facts
-                .coupling_stiffness
-                .map_or("none: the tool's pose is imposed".into(), |k| {
-                    format!("{} N/mm", short(k / 1e3))
-                }),
-        ),
-        (
             "mesh",
             format!("{} nodes, {} {order} elements", facts.nodes, facts.elements),
         ),
@@ -81,6 +47,61 @@ pub(super) fn key_numbers(page: &mut String, run: &Run, curve: &Curve) {
                 "{}, of which {} may touch",
                 facts.surface_nodes, facts.candidates
             ),
+        ),
+        (
+            "preparation",
+            format!("{} s{source}", short(facts.prepare_s)),
+        ),
+    ];
+    let mut rows: Vec<_> = rows.into_iter().map(|(l, v)| (l.to_owned(), v)).collect();
+    if !run.rows.is_empty() {
+        rows.extend(felt(run, curve));
+    }
+    // Where no clock was kept, no step can be late.
+    if let Some(missed) = facts.missed_deadlines {
+        rows.push(("missed deadlines".to_owned(), missed.to_string()));
+    }
+    labelled(page, &rows);
+}
+
+/// What the hand felt, and how well its steps were solved.
+fn felt(run: &Run, curve: &Curve) -> Vec<(String, String)> {
+    let millimetres = |m: f64| format!("{} mm", short(m * 1e3));
+    let newtons = |n: f64| format!("{} N", short(n));
+    let contacts = run.rows.iter().map(|row| row.contacts).max().unwrap_or(0);
+    let coupling = run.facts.coupling_stiffness;
+    let rows = [
+        ("felt peak insertion force", newtons(curve.peak_force_n)),
+        (
+            "travel at the felt peak",
+            millimetres(curve.travel_at_peak_m),
+        ),
+        ("felt snap drop", newtons(curve.snap_drop_n)),
+        (
+            "felt snap travel",
+            curve
+                .snap_travel_m
+                .map_or("does not snap".into(), millimetres),
+        ),
+        (
+            "felt insertion work",
+            format!("{} mJ", short(curve.insertion_work_j * 1e3)),
+        ),
+        (
+            "felt net work of the whole insertion",
+            format!("{} mJ", short(curve.net_work_j * 1e3)),
+        ),
+        (
+            "felt retention force",
+            curve
+                .retention_force_n
+                .map_or("not pulled out".into(), newtons),
+        ),
+        (
+            "coupling stiffness",
+            coupling.map_or("none: the tool's pose is imposed".into(), |k| {
+                format!("{} N/mm", short(k / 1e3))
+            }),
         ),
         ("most contacts at once", contacts.to_string()),
         ("steps", run.rows.len().to_string()),
@@ -92,15 +113,7 @@ pub(super) fn key_numbers(page: &mut String, run: &Run, curve: &Curve) {
             "worst imbalance of contact and coupling",
             format!("{:.1e}", max_wrench_mismatch(&run.rows)),
         ),
-        (
-            "preparation",
-            format!("{} s{source}", short(facts.prepare_s)),
-        ),
     ];
-    let mut rows: Vec<_> = rows.into_iter().map(|(l, v)| (l.to_owned(), v)).collect();
-    // Where no clock was kept, no step can be late.
-    if let Some(missed) = facts.missed_deadlines {
-        rows.push(("missed deadlines".to_owned(), missed.to_string()));
-    }
-    labelled(page, &rows);
+    let owned = |(label, value): (&str, String)| (label.to_owned(), value);
+    rows.into_iter().map(owned).collect()
 }

@@ -6,6 +6,7 @@ use plotters::prelude::*;
 
 use super::super::curve::Curve;
 use super::super::data::{Handbook, Phase, Run};
+use super::super::part_curve::Place;
 use super::{
     Area, BLUE, FINE, Format, GREEN, GREY, GRID, INK, Key, ORANGE, VERMILLION, draw, empty, short,
     stroke, words,
@@ -77,26 +78,41 @@ pub struct Mark {
     pub name: String,
 }
 
-/// What the hand felt, and the handbook's curve where there is one.
-pub fn felt(run: &Run) -> Vec<Series> {
-    let of_phase = |wanted: &dyn Fn(Phase) -> bool| {
-        let rows = run.rows.iter().filter(|row| wanted(row.phase));
+/// The part's own curve, what the hand felt beside it, and the handbook's curve, as far as there are any.
+pub fn curves(run: &Run) -> Vec<Series> {
+    let mut all = Vec::new();
+    let mut add = |name: &str, points: Vec<(f64, f64)>, look| {
+        if !points.is_empty() {
+            all.push(Series {
+                name: name.to_owned(),
+                points,
+                look,
+            });
+        }
+    };
+    let driven = run.driven.as_ref().map_or(&[][..], |driven| &driven.rows);
+    let driven = |is_out: bool| {
+        let rows = driven
+            .iter()
+            .filter(|r| (r.phase == Phase::Retract) == is_out);
         rows.map(|row| (row.travel_m, row.force_n)).collect()
     };
-    let series = |name: &str, points, look| Series {
-        name: name.to_owned(),
-        points,
-        look,
+    let felt = |is_out: bool| {
+        let rows = run
+            .rows
+            .iter()
+            .filter(|r| (r.phase == Phase::Retract) == is_out);
+        rows.map(|row| (row.travel_m, row.force_n)).collect()
     };
-    let mut all = vec![series(
-        "pushing in",
-        of_phase(&|phase| phase != Phase::Retract),
-        Look::In,
-    )];
-    let out: Vec<(f64, f64)> = of_phase(&|phase| phase == Phase::Retract);
-    if !out.is_empty() {
-        all.push(series("pulling out", out, Look::Out));
-    }
+    add("pushing in", driven(false), Look::In);
+    add("pulling out", driven(true), Look::Out);
+    let (felt_in, felt_out) = if run.driven.is_some() {
+        (Look::OtherIn, Look::OtherOut)
+    } else {
+        (Look::In, Look::Out)
+    };
+    add("felt by the hand", felt(false), felt_in);
+    add("felt, pulling out", felt(true), felt_out);
     all.extend(run.handbook.as_ref().and_then(of_handbook));
     all
 }
@@ -111,11 +127,19 @@ fn of_handbook(handbook: &Handbook) -> Option<Series> {
     })
 }
 
-/// The peak of the felt curve, if there is one.
-pub fn peak(curve: &Curve) -> Option<Mark> {
-    curve.peak_row_idx.map(|_| Mark {
-        travel_m: curve.travel_at_peak_m,
-        force_n: curve.peak_force_n,
+/// The snap's peak, or else the largest force; of the felt curve where there is no other.
+pub fn peak(run: &Run, felt: &Curve) -> Option<Mark> {
+    let driven = run.driven.as_ref().map(|driven| driven.curve.insertion());
+    let of_felt = || {
+        felt.peak_row_idx.map(|_| Place {
+            travel_m: felt.travel_at_peak_m,
+            force_n: felt.peak_force_n,
+        })
+    };
+    let place = driven.unwrap_or_else(of_felt)?;
+    Some(Mark {
+        travel_m: place.travel_m,
+        force_n: place.force_n,
         name: "peak".to_owned(),
     })
 }
@@ -271,8 +295,8 @@ mod tests {
     use super::*;
 
     fn of_run(run: &Run) -> String {
-        let mark = peak(&Curve::of(&run.rows));
-        force_travel(&felt(run), mark.as_ref(), Format::Wide).unwrap()
+        let mark = peak(run, &Curve::of(&run.rows));
+        force_travel(&curves(run), mark.as_ref(), Format::Wide).unwrap()
     }
 
     #[test]
@@ -282,7 +306,7 @@ mod tests {
         for text in [
             "(mm)",
             "(N)",
-            "peak 40 N at 2 mm",
+            "peak 42 N at 2 mm",
             "pushing in",
             "pulling out",
             "handbook: cantilever",
@@ -315,15 +339,10 @@ mod tests {
     #[test]
     fn curves_are_told_apart() {
         let run = sample::run();
-        let mut series = felt(&run);
-        series.push(Series {
-            name: "as felt by the hand".into(),
-            points: vec![(0.0, 0.0), (4e-3, 30.0)],
-            look: Look::OtherIn,
-        });
+        let series = curves(&run);
         for format in [Format::Wide, Format::Narrow] {
             let svg = force_travel(&series, None, format).unwrap();
-            assert!(svg.contains("as felt by the hand"));
+            assert!(svg.contains("felt by the hand"));
             for look in [Look::In, Look::Out, Look::OtherIn] {
                 let RGBColor(r, g, b) = look.colour();
                 let colour = format!("#{r:02X}{g:02X}{b:02X}");

@@ -18,7 +18,7 @@ pub struct Errors {
     /// (peak - peak_ref) / peak_ref of the force along the approach, at the snap, or at the largest force where
     /// neither snaps; `None` if only one of them snaps.
     pub peak: Option<f64>,
-    /// m, travel of the handle at the peak, minus that of the reference.
+    /// m, travel at the peak, minus that of the reference.
     pub peak_travel: Option<f64>,
     /// ‖u - u_ref‖ / ‖u_ref‖ of the drawn displacement where the part can touch.
     pub displacement: Option<f64>,
@@ -35,7 +35,7 @@ pub struct Reference {
     pub bar: Option<f64>,
     /// How the bar was found.
     pub bar_made: String,
-    /// On the handle by step, as [`Measured::wrench`].
+    /// On the tool by step, as [`Measured::wrench`].
     pub wrench: Vec<[f64; 6]>,
     /// J, as [`Measured::potential`].
     pub potential: Vec<f64>,
@@ -73,7 +73,7 @@ impl Scales {
         snap(wrenches.iter().map(|w| self.resistance(w)))
     }
 
-    /// m, the handle's travel at a step of the path.
+    /// m, the travel at a step of the path.
     pub(super) fn travel_at(&self, step: usize, n_steps: usize) -> f64 {
         self.travel * step as f64 / n_steps.saturating_sub(1).max(1) as f64
     }

@@ -5,7 +5,6 @@ mod two_rates;
 use std::time::Instant;
 
 use contact::tool::Tool;
-use device::Wrench;
 use fem::{Hierarchy, Mesh};
 use glam::DVec3;
 use glamx::DPose3;
@@ -13,12 +12,12 @@ use serde::{Deserialize, Serialize};
 
 use super::busy::Repeats;
 use super::point::Setting;
-use crate::engine::{Engine, N_STAGES, Stage, StepReport};
+use crate::engine::{Engine, N_STAGES, Stage};
 use crate::prepare::{PrepareOptions, PreparedPart, prepare};
 use crate::progress::Ui;
 use crate::report::summary::Percentiles;
-use crate::scene::{Handle, Rates, Scene};
-use crate::session::part_extent;
+use crate::scene::{Hand, Handle, Rates, Scene};
+use crate::session::{Held, Holds, part_extent};
 use crate::shape::Shape;
 use crate::{Error, interrupt, setup};
 
@@ -38,7 +37,7 @@ const FEWEST_ROUNDS: usize = 2;
 const REPEATED_ROUNDS: usize = 4;
 const MOST_TIME: f64 = 10.0;
 
-/// How the handle goes: from the start to the end of its travel, without the hand's own motion, so
+/// How the held body goes: from the start to the end of its travel, rigidly as in the part's own curve, so
 /// that all settings are asked the same question.
 #[derive(Clone, Debug)]
 pub(super) struct Course {
@@ -47,24 +46,23 @@ pub(super) struct Course {
 
 impl Course {
     pub(super) fn of(scene: &Scene) -> Self {
-        let hand = &scene.hand;
-        let per_step = hand.speed * scene.device.servo_period;
-        let n = ((hand.travel / per_step).ceil() as usize).clamp(1, MOST_STEPS);
-        let tool = scene.tool.pose_part_tool;
+        let drive = &scene.drive;
+        let per_period = |hand: &Hand| hand.speed * scene.device.servo_period;
+        let per_step = scene.hand.as_ref().map_or(drive.step, per_period);
+        let n = ((drive.travel / per_step).ceil() as usize).clamp(1, MOST_STEPS);
+        // Nothing turns, so that where the body is held does not matter.
+        let held = Held {
+            holds: match scene.handle {
+                Handle::Tool => Holds::Tool,
+                Handle::Part => Holds::Part,
+            },
+            grip: DVec3::ZERO,
+            tool_pose: scene.tool.pose_part_tool,
+        };
         let targets = (0..=n)
             .map(|k| {
-                let shift = hand.travel * k as f64 / n as f64 * hand.direction;
-                match scene.handle {
-                    Handle::Tool => DPose3 {
-                        translation: tool.translation + shift,
-                        ..tool
-                    },
-                    // The part goes; in its own frame the tool comes.
-                    Handle::Part => DPose3 {
-                        translation: tool.translation - shift,
-                        ..tool
-                    },
-                }
+                let shift = drive.travel * k as f64 / n as f64 * drive.direction;
+                held.target(&held.along(shift))
             })
             .collect();
         Self { targets }
@@ -272,9 +270,9 @@ pub struct Measured {
     pub switch_change: f64,
     /// m, deepest that a node was inside the tool.
     pub penetration: f64,
-    /// On the handle about its point, by step: force (N) and torque (N m).
+    /// On the tool about the point at which it is held, by step: force (N) and torque (N m).
     pub wrench: Vec<[f64; 6]>,
-    /// J, strain energy and that of the coupling, by step.
+    /// J, strain energy and that of a free guide's springs, by step.
     pub potential: Vec<f64>,
     /// m, drawn displacement at the samples by moment; empty if the mesh does not have them.
     pub displacement: Vec<f64>,
@@ -306,16 +304,6 @@ impl Measured {
     }
 }
 
-/// J, of the spring between handle and tool.
-fn energy_of_coupling(scene: &Scene, report: &StepReport) -> f64 {
-    let compliance = [
-        1.0 / scene.coupling.translational_stiffness,
-        1.0 / scene.coupling.rotational_stiffness,
-    ];
-    let wrench = report.coupling_wrench_on_tool.iter().enumerate();
-    wrench.map(|(i, w)| 0.5 * w * w * compliance[i / 3]).sum()
-}
-
 /// A part that is prepared, with what is driven.
 pub(super) struct Ready {
     pub(super) prepared: PreparedPart,
@@ -336,7 +324,8 @@ pub(super) fn ready(
     spec.refinements = setting.refinements;
     let prepared = prepare(&spec, options, ui)?;
     let (tool, _) = setup::tool(&setting.scene)?;
-    let engine = setup::engine(&setting.scene, &prepared, tool)?;
+    let rows = setting.scene.accuracy.max_contacts;
+    let engine = setup::drive_engine(&setting.scene, &prepared, tool, rows)?;
     let shape = Shape::new(&prepared, &setting.scene.accuracy, None)?;
     Ok(Ready {
         prepared,
@@ -376,10 +365,8 @@ pub(super) fn measure(
     for (k, target) in course.targets.iter().enumerate() {
         let report = engine.step(target);
         contact_wrench.push(report.contact_wrench_on_tool);
-        let on_tool = Wrench::from_array(&report.contact_wrench_on_tool);
-        let on_handle = on_tool.about(report.tool_pose.translation, target.translation);
-        found.wrench.push(on_handle.to_array());
-        let of_coupling = energy_of_coupling(scene, &report);
+        found.wrench.push(report.contact_wrench_on_tool);
+        let of_guide = engine.energy_of_guide(&report.contact_wrench_on_tool);
         let contacts = engine.active_contacts().to_vec();
         let of_part: f64 = contacts
             .iter()
@@ -389,7 +376,7 @@ pub(super) fn measure(
                     .dot(engine.displacement(c.candidate as usize))
             })
             .sum();
-        found.potential.push(of_coupling + of_part);
+        found.potential.push(of_guide + of_part);
         found.contacts = found.contacts.max(report.contacts);
         found.not_converged += usize::from(!report.converged);
         found.certificate = found.certificate.max(report.certificate);

@@ -223,7 +223,7 @@ fn page(study: &Study, plots: [&String; 4], curves: &str) -> String {
     );
     let _ = writeln!(
         page,
-        "<p>Reference: {}; {} (travel of the handle). Its own error is {}: {}. The scene's own settings: \
+        "<p>Reference: {}; {} (travel of the held body). Its own error is {}: {}. The scene's own settings: \
          {}.</p>",
         escaped(&study.reference.made),
         study.peak_words(),
@@ -345,7 +345,7 @@ fn page(study: &Study, plots: [&String; 4], curves: &str) -> String {
 }
 
 fn curves_caption(study: &Study) -> String {
-    let mut caption = "Force over the handle's travel at other orders and meshes.".to_owned();
+    let mut caption = "Force over the travel at other orders and meshes.".to_owned();
     for (label, peak) in &study.off_scale {
         let _ = write!(
             caption,

@@ -83,9 +83,9 @@ pub fn resolved(
     }
     ui.end_status();
     let scales = Scales {
-        direction: scene.hand.direction.to_array(),
+        direction: scene.drive.direction.to_array(),
         lever,
-        travel: scene.hand.travel,
+        travel: scene.drive.travel,
     };
     for (rung, path) in rungs.iter_mut().zip(&paths) {
         rung.error = distance(path, &paths[0], &scales);

@@ -16,10 +16,10 @@ use crate::{leftovers, setup};
 
 /// Changes when what is stored of a setting means something else. Since 2, what was not timed has no times; before, it
 /// had 0 µs.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 
 /// The same of a reference in a file.
-const REFERENCE_FORMAT: u32 = 1;
+const REFERENCE_FORMAT: u32 = 2;
 
 /// What a scene is, whatever its settings of accuracy: a hash of mesh, material, supports, contact,
 /// tool, path and coupling.
@@ -48,15 +48,14 @@ pub(super) fn identity(scene: &Scene) -> Result<String, Error> {
         shape => format!("{shape:?}"),
     };
     let rest = format!(
-        "{} {groups:?} {contact:?} {} {} {shape} {:?} {:?} {:?} {} {} {} {:?}",
+        "{} {groups:?} {contact:?} {} {} {shape} {:?} {:?} {:?} {:?} {} {:?}",
         scene.length_scale,
         material.young_modulus,
         material.poisson_ratio,
         scene.tool.pose_part_tool,
         scene.handle,
-        scene.hand.direction,
-        scene.hand.travel,
-        scene.hand.speed,
+        scene.drive,
+        scene.hand.as_ref().map(|hand| hand.speed),
         scene.device.servo_period,
         scene.coupling,
     );

@@ -3,10 +3,9 @@
 use std::time::Instant;
 
 use device::Wrench;
-use glamx::DPose3;
 
+use super::penetration;
 use super::{Course, Measured, Ready, Rounds, Times, contact_edges, displaced};
-use super::{energy_of_coupling, penetration};
 use crate::engine::{Stage, StepReport};
 use crate::scene::Scene;
 use crate::session::fast::FastSettings;
@@ -49,7 +48,7 @@ pub(super) fn measure(
         let mut stepped = Stepped::new(engine, &course.targets[0], every, settings)?;
         for (k, target) in course.targets.iter().enumerate() {
             let begun = Instant::now();
-            let answer = stepped.tick(k as u64, target, |report| on_handle(report, target));
+            let answer = stepped.tick(k as u64, target, on_tool);
             let tick = begun.elapsed();
             if stepped.work(engine, k as u64, target).is_some() {
                 let begun = Instant::now();
@@ -71,7 +70,8 @@ pub(super) fn measure(
                 let u = displacement(c.candidate as usize);
                 0.5 * c.force_on_part.dot(u)
             });
-            let energy = energy_of_coupling(scene, report) + of_part.sum::<f64>();
+            let of_guide = engine.energy_of_guide(&report.contact_wrench_on_tool);
+            let energy = of_guide + of_part.sum::<f64>();
             found.potential.push(energy);
             found.wrench.push(answer.wrench_on_handle.to_array());
             found.contacts = found.contacts.max(report.contacts);
@@ -94,7 +94,6 @@ pub(super) fn measure(
     Ok(found)
 }
 
-fn on_handle(report: &StepReport, target: &DPose3) -> Wrench {
-    let on_tool = Wrench::from_array(&report.contact_wrench_on_tool);
-    on_tool.about(report.tool_pose.translation, target.translation)
+fn on_tool(report: &StepReport) -> Wrench {
+    Wrench::from_array(&report.contact_wrench_on_tool)
 }

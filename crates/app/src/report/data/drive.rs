@@ -1,0 +1,62 @@
+//! The part's own curve: the held body driven along its path, without a hand.
+
+use super::super::part_curve::{Doubts, LimitFact, Limits, PartCurve, Verdict, limits};
+use super::super::strain::StrainFacts;
+use super::Phase;
+
+/// One place of the driven body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DriveRow {
+    /// On the way in, at its end, or on the way out.
+    pub phase: Phase,
+    /// Travel of the held body along the direction since the start, m; imposed.
+    pub travel_m: f64,
+    /// Force along the direction, N: positive where the part resists the way in; negative where it
+    /// pulls in, or, on the way out, where it resists removal.
+    pub force_n: f64,
+    /// Travel of the held body across the direction, m; 0 unless it is free to move so.
+    pub sideways_m: f64,
+    /// Turn of the held body, rad; 0 unless it is free to turn.
+    pub turn_rad: f64,
+    /// Places that carry force.
+    pub contacts: u32,
+    /// Whether the contact planes stood still and the contact problem was solved to its tolerance.
+    pub is_converged: bool,
+    /// How deep the tool is in nodes that cannot give way, m; 0 if it is in none.
+    pub passed_m: f64,
+}
+
+/// The driven curve, what is read off it, and what was asked of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Driven {
+    /// In the order in which they were driven.
+    pub rows: Vec<DriveRow>,
+    /// What the rows say.
+    pub curve: PartCurve,
+    /// Whether the part snaps, and why.
+    pub verdict: Verdict,
+    /// What the scene asks of the part, and whether it is so.
+    pub limits: Vec<LimitFact>,
+}
+
+impl Driven {
+    /// Reads numbers, verdict and limits off the driven rows. `doubts`: what speaks against taking
+    /// the curve for the part's; `asked` and `strain`: what the scene asks of the part, and the
+    /// largest strain of the same run.
+    pub fn of(rows: Vec<DriveRow>, doubts: &Doubts, asked: &Limits, strain: &StrainFacts) -> Self {
+        let curve = PartCurve::of(&rows);
+        let verdict = Verdict::of(&curve, doubts);
+        let limits = limits::judge(asked, &curve, &verdict, strain);
+        Self {
+            rows,
+            curve,
+            verdict,
+            limits,
+        }
+    }
+
+    /// Whether all limits are kept for sure; true where none is asked for.
+    pub fn keeps_limits(&self) -> bool {
+        self.limits.iter().all(LimitFact::is_kept)
+    }
+}

@@ -1,0 +1,142 @@
+//! The part's own curve in `summary.json`.
+
+use serde::Serialize;
+
+use super::super::data::Driven;
+use super::super::part_curve::{Hump, Place, Removal};
+
+#[derive(Serialize)]
+pub(super) struct VerdictSummary<'a> {
+    outcome: &'static str,
+    so_far: &'static str,
+    reasons: &'a [String],
+}
+
+pub(super) fn verdict(driven: &Driven) -> VerdictSummary<'_> {
+    let verdict = &driven.verdict;
+    VerdictSummary {
+        outcome: verdict.outcome.name(),
+        so_far: verdict.so_far.name(),
+        reasons: &verdict.reasons,
+    }
+}
+
+#[derive(Serialize)]
+pub(super) struct LimitSummary<'a> {
+    key: &'a str,
+    limit: f64,
+    value: Option<f64>,
+    state: &'static str,
+    text: &'a str,
+}
+
+pub(super) fn limits(driven: &Driven) -> Vec<LimitSummary<'_>> {
+    let all = driven.limits.iter();
+    all.map(|fact| LimitSummary {
+        key: fact.key,
+        limit: fact.limit,
+        value: fact.value,
+        state: fact.state.name(),
+        text: &fact.text,
+    })
+    .collect()
+}
+
+#[derive(Serialize)]
+#[expect(
+    non_snake_case,
+    reason = "keys of the file carry their unit in its own letters"
+)]
+struct PlaceSummary {
+    force_N: f64,
+    travel_m: f64,
+}
+
+impl From<Place> for PlaceSummary {
+    fn from(place: Place) -> Self {
+        Self {
+            force_N: place.force_n,
+            travel_m: place.travel_m,
+        }
+    }
+}
+
+#[derive(Serialize)]
+#[expect(
+    non_snake_case,
+    reason = "keys of the file carry their unit in its own letters"
+)]
+struct HumpSummary {
+    peak_force_N: f64,
+    travel_at_peak_m: f64,
+    lowest_force_N: f64,
+    travel_at_lowest_m: f64,
+    drop_N: f64,
+    snap_ratio: f64,
+    snap_travel_m: Option<f64>,
+}
+
+impl From<&Hump> for HumpSummary {
+    fn from(hump: &Hump) -> Self {
+        Self {
+            peak_force_N: hump.force_n,
+            travel_at_peak_m: hump.travel_m,
+            lowest_force_N: hump.lowest_n,
+            travel_at_lowest_m: hump.lowest_travel_m,
+            drop_N: hump.drop_n,
+            snap_ratio: hump.ratio,
+            snap_travel_m: hump.gone_after_m,
+        }
+    }
+}
+
+#[derive(Serialize)]
+#[expect(
+    non_snake_case,
+    reason = "keys of the file carry their unit in its own letters"
+)]
+pub(super) struct CurveSummary {
+    file: &'static str,
+    steps: usize,
+    peak_insertion_force_N: Option<f64>,
+    travel_at_peak_m: Option<f64>,
+    snap: Option<HumpSummary>,
+    humps: Vec<HumpSummary>,
+    seat: Option<PlaceSummary>,
+    end: PlaceSummary,
+    insertion_work_J: f64,
+    net_work_J: f64,
+    peak_removal_force_N: Option<f64>,
+    travel_at_removal_m: Option<f64>,
+    is_out: Option<bool>,
+    sideways_m: f64,
+    turn_deg: f64,
+    not_converged: usize,
+}
+
+pub(super) fn curve(driven: &Driven) -> CurveSummary {
+    let curve = &driven.curve;
+    let (insertion, removal) = (curve.insertion(), curve.removal.peak());
+    CurveSummary {
+        file: "curve.csv",
+        steps: curve.n_steps,
+        peak_insertion_force_N: insertion.map(|place| place.force_n),
+        travel_at_peak_m: insertion.map(|place| place.travel_m),
+        snap: curve.snap().map(HumpSummary::from),
+        humps: curve.humps.iter().map(HumpSummary::from).collect(),
+        seat: curve.seat.map(PlaceSummary::from),
+        end: curve.end.into(),
+        insertion_work_J: curve.insertion_work_j,
+        net_work_J: curve.net_work_j,
+        peak_removal_force_N: removal.map(|place| place.force_n),
+        travel_at_removal_m: removal.map(|place| place.travel_m),
+        is_out: match curve.removal {
+            Removal::NotPulled => None,
+            Removal::StillHeld(_) => Some(false),
+            Removal::Out(_) => Some(true),
+        },
+        sideways_m: curve.sideways_m,
+        turn_deg: curve.turn_rad.to_degrees(),
+        not_converged: curve.n_unconverged,
+    }
+}

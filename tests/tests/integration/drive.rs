@@ -57,7 +57,7 @@ fn a_scene_without_a_hand_has_the_parts_curve_and_nothing_felt() {
     }
     let page = fs::read_to_string(out.join("report.html")).unwrap();
     for text in [
-        "NaN",
+        " NaN",
         "felt by the hand",
         "felt peak insertion force",
         "Time of a step",

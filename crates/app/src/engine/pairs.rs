@@ -43,6 +43,12 @@ impl Pairs {
         }
     }
 
+    /// As new: what was known before decides which of C_ij and C_jiᵀ is read, and they differ by round-off.
+    pub(super) fn reset(&mut self) {
+        self.clear();
+        self.hand = 0;
+    }
+
     /// Candidates by slot.
     pub(super) fn known(&self) -> &[u32] {
         &self.known

@@ -147,6 +147,7 @@ impl Scratch {
         self.n_own = 0;
         self.was_active.fill(false);
         self.prune.clear();
+        self.pairs.reset();
     }
 
     /// Begins a search for equilibrium: only nodes that carry force have had a plane.

@@ -28,6 +28,9 @@ use crate::session::{Record, Recording, part_extent};
 use crate::shape::Shape;
 use moments::Moments;
 
+/// Of the peak, the height of steps from node to node above which they are taken for it.
+const MOST_TOOTH: f64 = 0.5;
+
 /// Everything that a run is made of.
 pub(crate) struct Story<'a> {
     pub(crate) scene: &'a Scene,
@@ -85,6 +88,12 @@ impl Story<'_> {
         let gets_in = between.gets_in(way);
         let between = between.warning(way);
         let mut doubts: Vec<String> = between.clone().filter(|_| gets_in).into_iter().collect();
+        // Where the force falls from node to node by most of the peak, the peak may be that of a node.
+        let teeth = self
+            .doubts
+            .iter()
+            .filter(|w| w.id == "teeth" && w.number > Some(MOST_TOOTH));
+        doubts.extend(teeth.map(|w| w.text.clone()));
         // A way that ends behind the snap ends at a seat.
         doubts.extend(self.stopped().filter(|_| snap.is_none()));
         let driven = self.judged(&verdicts, doubts, &strained.facts);
@@ -186,7 +195,7 @@ impl Story<'_> {
             turn_rad: r.turn,
             contacts: r.report.contacts,
             is_converged: r.report.converged && r.report.lcp_solved && r.report.dropped == 0,
-            passed_m: 0.0,
+            certificate: r.report.certificate,
         };
         recording.records.iter().map(row).collect()
     }
@@ -200,7 +209,6 @@ impl Story<'_> {
     ) -> report::Driven {
         let doubts = Doubts {
             missing_effects: effects.iter().filter_map(words::called_for).collect(),
-            passed_tolerance_m: 0.0,
             friction_share: effects
                 .iter()
                 .find(|v| v.missing && v.name == "friction")

@@ -87,7 +87,9 @@ pub(crate) fn after(
     let driven = &ran.driven.recording;
     let track = Track::of_drive(scene, driven);
     let mut warnings: Vec<Warning> = [
-        touch::nothing_touched(scene, ran.prepared, ran.engine, driven),
+        // What ends the way early touches, though nothing gives way.
+        touch::nothing_touched(scene, ran.prepared, ran.engine, driven)
+            .filter(|_| ran.driven.stopped_at.is_none()),
         bounce::negative_work(&track),
         teeth::from_node_to_node(&track, driven, &ran.prepared.loaded),
     ]
@@ -115,7 +117,7 @@ fn of_hand(scene: &Scene, hand: &Hand, felt: &Recording, driven: &Track) -> Vec<
         bounce::bounced(&track),
         bounce::negative_work(&track).filter(|_| bounce::negative_work(driven).is_none()),
         coupling::too_stiff(scene, hand, felt),
-        gave_way::gave_way(&track, driven),
+        gave_way::gave_way(&track, driven, scene.coupling.translational_stiffness),
     ];
     warnings.into_iter().flatten().collect()
 }

@@ -8,8 +8,8 @@ use crate::report::Warning;
 /// Of the way that was asked for and is open, what the body must have gone.
 const SHARE: f64 = 0.9;
 
-/// The body went less far than its handle was sent, although the part lets it through.
-pub(super) fn gave_way(felt: &Track, driven: &Track) -> Option<Warning> {
+/// The body went less far than its handle was sent, although the part lets it through. `coupling`: its stiffness, N/m.
+pub(super) fn gave_way(felt: &Track, driven: &Track, coupling: f64) -> Option<Warning> {
     let furthest = |track: &Track| track.samples.iter().map(|s| s.travel).fold(0.0, f64::max);
     let (went, open) = (furthest(felt), furthest(driven).min(felt.commanded));
     if went >= SHARE * open {
@@ -20,11 +20,7 @@ pub(super) fn gave_way(felt: &Track, driven: &Track) -> Option<Warning> {
     let (key, now) = if felt.commanded - handle >= handle - went {
         ("hand.stiffness", felt.grip)
     } else {
-        let deflection = (handle - went).max(f64::MIN_POSITIVE);
-        (
-            "coupling.translational_stiffness",
-            felt.peak_force / deflection,
-        )
+        ("coupling.translational_stiffness", coupling)
     };
     Some(warning(
         "hand-gave-way",
@@ -64,8 +60,8 @@ mod tests {
     #[test]
     fn a_body_that_stays_behind_is_told_with_the_spring_that_gave_way() {
         let driven = track(14.0, 14.0, 14.0);
-        assert_eq!(gave_way(&track(13.9, 14.0, 14.0), &driven), None);
-        let soft_hand = gave_way(&track(1.6, 2.0, 4.5), &driven).unwrap();
+        assert_eq!(gave_way(&track(13.9, 14.0, 14.0), &driven, 1e4), None);
+        let soft_hand = gave_way(&track(1.6, 2.0, 4.5), &driven, 1e4).unwrap();
         assert!(
             soft_hand.text.contains("1.60 of 4.50 mm"),
             "{}",
@@ -76,13 +72,16 @@ mod tests {
             "{}",
             soft_hand.text
         );
-        let soft_coupling = gave_way(&track(1.6, 4.4, 4.5), &driven).unwrap();
+        let soft_coupling = gave_way(&track(1.6, 4.4, 4.5), &driven, 1e4).unwrap();
         assert!(
             soft_coupling.text.contains("raise coupling"),
             "{}",
             soft_coupling.text
         );
         // Nothing lets the body further, whatever holds it.
-        assert_eq!(gave_way(&track(1.6, 4.4, 4.5), &track(1.6, 1.6, 4.5)), None);
+        assert_eq!(
+            gave_way(&track(1.6, 4.4, 4.5), &track(1.6, 1.6, 4.5), 1e4),
+            None
+        );
     }
 }

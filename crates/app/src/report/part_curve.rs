@@ -116,8 +116,6 @@ pub struct PartCurve {
     pub turn_rad: f64,
     /// Rows that did not converge.
     pub n_unconverged: usize,
-    /// Deepest place of the tool in nodes that cannot give way, m.
-    pub passed_m: f64,
 }
 
 impl PartCurve {
@@ -141,7 +139,6 @@ impl PartCurve {
                 .filter(|value: &f64| value.is_finite());
             values.map(f64::abs).fold(0.0, f64::max)
         };
-        let passed_m = largest_of(|row| row.passed_m);
         let largest = way_in
             .iter()
             .map(|p| p.place())
@@ -151,7 +148,7 @@ impl PartCurve {
         Self {
             n_steps: rows.len(),
             n_in: way_in.len(),
-            is_touched: passed_m > 0.0 || rows.iter().any(|row| row.contacts > 0),
+            is_touched: rows.iter().any(|row| row.contacts > 0),
             snap_idx: (0..humps.len()).rev().max_by(by_peak),
             seat,
             largest,
@@ -163,7 +160,6 @@ impl PartCurve {
             sideways_m: largest_of(|row| row.sideways_m),
             turn_rad: largest_of(|row| row.turn_rad),
             n_unconverged: rows.iter().filter(|row| !row.is_converged).count(),
-            passed_m,
             humps,
         }
     }

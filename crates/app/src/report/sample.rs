@@ -78,7 +78,7 @@ pub(super) fn drive_rows() -> Vec<DriveRow> {
         turn_rad: 0.0,
         contacts: (force_n.abs() / 2.0).ceil() as u32,
         is_converged: true,
-        passed_m: 0.0,
+        certificate: 0.0,
     };
     let force = |t: f64| match t {
         t if t < 2.0 => 21.0 * t,

@@ -97,7 +97,7 @@ struct Summary<'a> {
     strain: strain::StrainSummary,
     max_rotation_deg: f64,
     max_certificate: f64,
-    max_wrench_mismatch_rel: f64,
+    max_wrench_mismatch_rel: Option<f64>,
     made: &'a str,
     input_hash: String,
     nodes: usize,
@@ -246,6 +246,18 @@ pub fn json(run: &Run, curve: &Curve) -> String {
     let facts = &run.facts;
     let curve = &told(run, curve);
     let driven = run.driven.as_ref();
+    let is_felt = !run.rows.is_empty();
+    let (certificate, max_contacts) = match driven.filter(|_| !is_felt) {
+        Some(driven) => (
+            largest(driven.rows.iter().map(|row| row.certificate)),
+            driven.rows.iter().map(|row| row.contacts).max(),
+        ),
+        None => (
+            max_certificate(&run.rows),
+            run.rows.iter().map(|row| row.contacts).max(),
+        ),
+    };
+    let max_contacts = max_contacts.unwrap_or(0);
     let summary = Summary {
         schema_version: SCHEMA_VERSION,
         verdict: driven.map(driven::verdict),
@@ -262,15 +274,16 @@ pub fn json(run: &Run, curve: &Curve) -> String {
         max_principal_strain: facts.max_principal_strain,
         strain: strain::summary(&run.strain),
         max_rotation_deg: facts.max_rotation_deg,
-        max_certificate: max_certificate(&run.rows),
-        max_wrench_mismatch_rel: max_wrench_mismatch(&run.rows),
+        max_certificate: certificate,
+        // A pose that is imposed carries whatever the contacts ask for.
+        max_wrench_mismatch_rel: is_felt.then(|| max_wrench_mismatch(&run.rows)),
         made: &run.origin.made,
         input_hash: run.origin.hash(),
         nodes: facts.nodes,
         elements: facts.elements,
         order: facts.order,
         surface_nodes: facts.surface_nodes,
-        max_contacts: run.rows.iter().map(|row| row.contacts).max().unwrap_or(0),
+        max_contacts,
         steps: run.rows.len(),
         // Other programs count on a number; without a clock nothing is late.
         missed_deadlines: facts.missed_deadlines.unwrap_or(0),

@@ -22,8 +22,8 @@ pub struct DriveRow {
     pub contacts: u32,
     /// Whether the contact planes stood still and the contact problem was solved to its tolerance.
     pub is_converged: bool,
-    /// How deep the tool is in nodes that cannot give way, m; 0 if it is in none.
-    pub passed_m: f64,
+    /// Largest violation of the contact conditions, scaled; 0 is exact.
+    pub certificate: f64,
 }
 
 /// The driven curve, what is read off it, and what was asked of it.

@@ -30,7 +30,7 @@ fn row(phase: Phase, travel_mm: f64, force_n: f64) -> DriveRow {
         turn_rad: 0.0,
         contacts: u32::from(force_n != 0.0),
         is_converged: true,
-        passed_m: 0.0,
+        certificate: 0.0,
     }
 }
 
@@ -330,27 +330,24 @@ fn the_pull_out_is_positive_and_told_only_where_its_peak_is_passed() {
 fn what_the_curve_cannot_tell_is_said_with_what_it_looks_like() {
     let mut rows = polygon(Approach, &SNAP);
     rows[20].is_converged = false;
-    rows[70].passed_m = 2e-6;
     (rows[30].sideways_m, rows[31].turn_rad) = (-4e-4, -0.02);
     let curve = PartCurve::of(&rows);
     assert_eq!((curve.sideways_m, curve.turn_rad), (4e-4, 0.02));
     let doubts = Doubts {
         missing_effects: vec!["friction is called for".into()],
         friction_share: Some(0.6),
-        passed_tolerance_m: 1e-6,
         others: vec!["another".into()],
     };
     let verdict = Verdict::of(&curve, &doubts);
     assert_eq!(verdict.outcome, Outcome::Incomplete);
     assert_eq!(verdict.so_far, Outcome::Snaps);
-    let [friction, passed, steps, another] = &verdict.reasons[..] else {
+    let [friction, steps, another] = &verdict.reasons[..] else {
         panic!("{:?}", verdict.reasons)
     };
     assert_eq!(
         (friction.as_str(), another.as_str()),
         ("friction is called for", "another")
     );
-    assert!(passed.contains("0.002 mm into held nodes"), "{passed}");
     assert!(
         steps.starts_with("1 of 201 steps did not converge"),
         "{steps}"

@@ -48,8 +48,6 @@ pub struct Doubts {
     pub missing_effects: Vec<String>,
     /// By what share friction would raise the force of pushing in, where it is among them and was estimated.
     pub friction_share: Option<f64>,
-    /// Deeper in nodes that cannot give way than this, the tool has passed something, m.
-    pub passed_tolerance_m: f64,
     /// Whatever else makes the curve another than the part's, one sentence each.
     pub others: Vec<String>,
 }
@@ -113,12 +111,6 @@ fn missing(curve: &PartCurve, doubts: &Doubts) -> Vec<String> {
         reasons.push(format!(
             "the way in has {} steps that can be told: make drive.step smaller or drive.travel longer",
             curve.n_in
-        ));
-    }
-    if curve.passed_m > doubts.passed_tolerance_m {
-        reasons.push(format!(
-            "the tool went {} mm into held nodes, which cannot give way: change the path, or free them in part.fixed",
-            short(1e3 * curve.passed_m)
         ));
     }
     if curve.n_unconverged > 0 {

@@ -369,20 +369,43 @@ fn group<'a>(
     path: &Path,
     role: &str,
 ) -> Result<&'a fem::Group, Error> {
-    mesh.group(&wanted.name).ok_or_else(|| {
-        let known: Vec<&str> = mesh.groups.iter().map(|g| g.name.as_str()).collect();
-        let mend = if known.is_empty() {
-            "it has none: name regions in Gmsh with Physical Surface(\"...\")".to_owned()
-        } else {
-            format!("it has {}", known.join(", "))
-        };
-        Error::Input(format!(
-            "{}: {role} names the group {:?}, which {} does not have; {mend}",
-            wanted.place,
-            wanted.name,
-            path.display(),
-        ))
-    })
+    let named = mesh.groups.iter().filter(|g| g.name == wanted.name);
+    match named.collect::<Vec<_>>()[..] {
+        [group] => Ok(group),
+        [] => {
+            let known: Vec<&str> = mesh.groups.iter().map(|g| g.name.as_str()).collect();
+            let mend = if known.is_empty() {
+                "it has none: name regions in Gmsh with Physical Surface(\"...\")".to_owned()
+            } else {
+                format!("it has {}", known.join(", "))
+            };
+            Err(Error::Input(format!(
+                "{}: {role} names the group {:?}, which {} does not have; {mend}",
+                wanted.place,
+                wanted.name,
+                path.display(),
+            )))
+        }
+        ref several => {
+            let kinds: Vec<&str> = several.iter().map(|g| kind_of(g)).collect();
+            Err(Error::Input(format!(
+                "{}: {role} names the group {:?}, of which {} has several: {}; give each a name of its own",
+                wanted.place,
+                wanted.name,
+                path.display(),
+                kinds.join(" and "),
+            )))
+        }
+    }
+}
+
+fn kind_of(group: &fem::Group) -> &'static str {
+    match group.dimension {
+        0 => "one of points",
+        1 => "one of curves",
+        2 => "one of surfaces",
+        _ => "one of volumes",
+    }
 }
 
 /// Loads the part and gets its compliance, from the cache or anew.

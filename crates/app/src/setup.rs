@@ -7,7 +7,8 @@ use std::sync::Arc;
 use contact::lcp;
 use contact::surface::Surface;
 use contact::tool::{
-    BoxShape, Capsule, Cylinder, DistanceField, Features, HalfSpace, Mesh as ToolMesh, Sphere, Tool,
+    BoxShape, Capsule, Cylinder, DistanceField, Features, HalfSpace, Mesh as ToolMesh, MeshRepair,
+    Sphere, Tool,
 };
 use device::{HandSettings, VirtualCoupling};
 use fem::{Material, Quadrature};
@@ -133,34 +134,49 @@ fn tool_mesh(
     scale: f64,
 ) -> Result<(Tool, Vec<String>), Error> {
     let mesh = ToolMesh::read(file, scale).map_err(|e| {
+        let what = match e {
+            contact::Error::MeshFile { cause, .. } => cause,
+            other => other.to_string(),
+        };
         Error::Input(format!(
-            "{}:{line}: tool.file {}: {e}",
+            "{}:{line}: tool.file {}: {what}",
             scene.path.display(),
             file.display()
         ))
     })?;
-    let repair = mesh.repair();
+    let remarks = repairs(mesh.repair(), scene.length_unit())
+        .map(|what| format!("{}: {what}", file.display()))
+        .collect();
+    Ok((Tool::Mesh(Arc::new(mesh)), remarks))
+}
+
+/// What the reader of a mesh changed, in words. Equal corner points, which every STL file has, are not worth any.
+fn repairs(repair: MeshRepair, (unit, metres): (&str, f64)) -> impl Iterator<Item = String> {
     let counts = [
-        (repair.n_merged_vertices, "equal corner points were merged"),
         (
             repair.n_removed_triangles,
-            "triangles without area were removed",
+            "triangles without area were removed".to_owned(),
+        ),
+        (
+            repair.n_welded_vertices,
+            format!(
+                "corner points, apart by round-off, became one with their neighbour; none moved by more than {:.1e} {unit}",
+                repair.weld_distance / metres
+            ),
         ),
         (
             repair.n_turned_triangles,
-            "triangles were turned to face the same way",
+            "triangles were turned to face the same way".to_owned(),
         ),
         (
             repair.n_inverted_pieces,
-            "pieces were turned inside out to face outwards",
+            "pieces were turned inside out to face outwards".to_owned(),
         ),
     ];
-    let remarks = counts
+    counts
         .into_iter()
-        .filter(|(n, what)| *n > 0 && !what.contains("merged"))
-        .map(|(n, what)| format!("{}: {n} {what}", file.display()))
-        .collect();
-    Ok((Tool::Mesh(Arc::new(mesh)), remarks))
+        .filter(|(n, _)| *n > 0)
+        .map(|(n, what)| format!("{n} {what}"))
 }
 
 /// The tool behind a distance field, with a remark on what it holds.

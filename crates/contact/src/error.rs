@@ -4,6 +4,24 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 
+/// What a message's coordinates are counted in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Coordinates {
+    /// m.
+    Metres,
+    /// As they stand in the mesh file, where a modelling program finds them again.
+    OfFile,
+}
+
+impl std::fmt::Display for Coordinates {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Metres => "m",
+            Self::OfFile => "(coordinates of the file)",
+        })
+    }
+}
+
 /// Errors of this crate: refused input. A solver's outcome is not an error, see [`crate::lcp::Status`].
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {
@@ -103,50 +121,66 @@ pub enum Error {
         n_vertices: usize,
     },
     /// A triangle without area between three different points.
-    #[error("tool mesh triangle {triangle} at {position} m has no area; repair the mesh")]
+    #[error(
+        "tool mesh triangle {triangle} at {position} {coordinates} has no area; repair the mesh"
+    )]
     MeshZeroArea {
         /// Triangle, from 0.
         triangle: usize,
-        /// Its centre, m.
+        /// Its centre.
         position: DVec3,
+        /// What these are counted in.
+        coordinates: Coordinates,
     },
     /// An edge with one triangle only: inside and outside are undefined.
     #[error(
-        "tool mesh is open at the edge from {start} to {end} m ({n_edges} open edges); close it"
+        "tool mesh is open at the edge from {start} to {end} {coordinates} ({n_edges} open edges); close it"
     )]
     MeshOpen {
-        /// Start of the first open edge, m.
+        /// Start of the first open edge.
         start: DVec3,
-        /// End of the first open edge, m.
+        /// End of the first open edge.
         end: DVec3,
         /// How many open edges there are.
         n_edges: usize,
+        /// What these are counted in.
+        coordinates: Coordinates,
     },
     /// An edge shared by more than two triangles.
     #[error(
-        "tool mesh edge from {start} to {end} m is shared by {n_triangles} triangles; two are needed"
+        "tool mesh edge from {start} to {end} {coordinates} is shared by {n_triangles} triangles; two are needed"
     )]
     MeshEdgeNotManifold {
-        /// Start of the edge, m.
+        /// Start of the edge.
         start: DVec3,
-        /// End of the edge, m.
+        /// End of the edge.
         end: DVec3,
         /// Triangles on it.
         n_triangles: usize,
+        /// What these are counted in.
+        coordinates: Coordinates,
     },
     /// Two pieces of surface touch in a single vertex.
-    #[error("tool mesh surfaces touch in the single vertex {position} m; separate them")]
+    #[error(
+        "tool mesh surfaces touch in the single vertex {position} {coordinates}; separate them"
+    )]
     MeshVertexNotManifold {
-        /// The vertex, m.
+        /// The vertex.
         position: DVec3,
+        /// What these are counted in.
+        coordinates: Coordinates,
     },
     /// A one-sided surface, as a Moebius strip.
-    #[error("tool mesh has no consistent outside, see the edge from {start} to {end} m")]
+    #[error(
+        "tool mesh has no consistent outside, see the edge from {start} to {end} {coordinates}"
+    )]
     MeshNotOrientable {
-        /// Start of an edge where the sides contradict, m.
+        /// Start of an edge where the sides contradict.
         start: DVec3,
-        /// End of that edge, m.
+        /// End of that edge.
         end: DVec3,
+        /// What these are counted in.
+        coordinates: Coordinates,
     },
     /// A closed mesh that encloses nothing.
     #[error("tool mesh encloses no volume; it needs an inside")]

@@ -67,6 +67,6 @@ pub mod proximity;
 pub mod surface;
 pub mod tool;
 
-pub use error::Error;
+pub use error::{Coordinates, Error};
 // The versions of these that the interface speaks.
 pub use {glam, glamx};

@@ -12,7 +12,7 @@ pub enum Error {
         /// What is wrong there, and the mend.
         what: String,
     },
-    /// The mesh file has another version than 4.1.
+    /// The mesh file has a version that is not read.
     #[error(
         "MSH version {found} is not read; convert it with `gmsh {file} -save -format msh41 -o {file}`"
     )]
@@ -29,6 +29,17 @@ pub enum Error {
     NoTetrahedra {
         /// Other kinds that were found, or nothing.
         found: String,
+    },
+    /// A volume without tetrahedra, because Gmsh saves only what is in a group.
+    #[error(
+        "the mesh has no tetrahedra: {volumes} in no physical group, and Gmsh saves only what is in one; \
+         add `Physical Volume(\"body\") = {{{tags}}};` to the model and mesh it again with `gmsh -3 -order 2 -format msh41`"
+    )]
+    VolumeInNoGroup {
+        /// "its volume 1 is", or as many as there are.
+        volumes: String,
+        /// Their tags.
+        tags: String,
     },
     /// Elements of several orders.
     #[error("the mesh mixes tetrahedra of orders {0} and {1}; make it anew with one `-order`")]

@@ -150,6 +150,7 @@ mod tests {
             name: "edge".to_owned(),
             dimension: 2,
             nodes: vec![0, 1, 2],
+            lines: Vec::new(),
             faces: vec![Face {
                 nodes: vec![0, 1, 2],
             }],

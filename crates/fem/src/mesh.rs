@@ -25,10 +25,12 @@ pub struct Face {
 pub struct Group {
     /// Name in the file; `group-N` if it has none.
     pub name: String,
-    /// 2 for faces, 3 for elements.
+    /// 0 for points, 1 for curves, 2 for faces, 3 for elements.
     pub dimension: u8,
     /// Node indices, ascending, each once.
     pub nodes: Vec<u32>,
+    /// Lines of a group of dimension 1: 2, 3 or 4 node indices in the order of Gmsh's line, the ends first.
+    pub lines: Vec<Vec<u32>>,
     /// Faces of a group of dimension 2.
     pub faces: Vec<Face>,
     /// Element indices of a group of dimension 3.
@@ -50,6 +52,9 @@ pub struct Mesh {
     pub element_tags: Vec<u64>,
     /// Named groups.
     pub groups: Vec<Group>,
+    /// Names that several physical groups of one dimension have, with how many have it: in [`Mesh::groups`] they are
+    /// one group.
+    pub shared_names: Vec<(String, usize)>,
     node_of_tag: HashMap<u64, u32>,
 }
 
@@ -84,6 +89,7 @@ impl Mesh {
             elements,
             element_tags,
             groups,
+            shared_names: Vec::new(),
             node_of_tag,
         }
     }
@@ -116,12 +122,10 @@ impl Mesh {
         x
     }
 
-    /// The group of this name, faces before elements if there are both.
+    /// The group of this name; of several the faces, then the elements, the curves, the points.
     pub fn group(&self, name: &str) -> Option<&Group> {
-        self.groups
-            .iter()
-            .filter(|g| g.name == name)
-            .min_by_key(|g| g.dimension)
+        let named = self.groups.iter().filter(|g| g.name == name);
+        named.min_by_key(|g| [3, 2, 0, 1][usize::from(g.dimension.min(3))])
     }
 
     /// Index of the node with this tag in the file.

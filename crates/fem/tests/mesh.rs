@@ -4,6 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
+use fem::element::Order;
 use fem::mesh::gmsh;
 use fem::{Error, Mesh};
 
@@ -90,33 +91,211 @@ fn a_face_may_be_in_several_groups_and_names_may_have_spaces() {
     }
 }
 
+/// What a group is, whatever the order of nodes and elements in the file.
+fn places(mesh: &Mesh, nodes: &[u32]) -> Vec<[i64; 3]> {
+    // 2.2 writes 16 digits.
+    let place = |n: &u32| mesh.nodes[*n as usize].map(|x| (1e9 * x).round() as i64);
+    let mut places: Vec<_> = nodes.iter().map(place).collect();
+    places.sort_unstable();
+    places
+}
+
+const VERSIONS: [&str; 5] = [
+    "2.2-ascii",
+    "2.2-binary",
+    "4.0-ascii",
+    "4.1-ascii",
+    "4.1-binary",
+];
+
 #[test]
-fn other_versions_name_the_command_that_converts() {
-    for version in ["2.2", "4"] {
-        let name = if version == "4" {
-            "box-version4.0.msh"
-        } else {
-            "box-version2.2.msh"
-        };
-        let error = gmsh::read(&data(name)).unwrap_err();
-        assert!(
-            matches!(&error, Error::Version { found, .. } if found == version),
-            "{error}"
-        );
-        assert!(
-            error.to_string().contains("gmsh") && error.to_string().contains("msh41"),
-            "{error}"
-        );
+fn all_versions_whole_or_partitioned_hold_the_same_mesh() {
+    let expected = read("groups-version4.1-ascii.msh");
+    // As meshio 5.3.5 counts.
+    assert_eq!((expected.n_nodes(), expected.n_elements()), (107, 44));
+    for version in VERSIONS {
+        for name in ["groups-version", "groups-partitioned"] {
+            let name = format!("{name}{version}.msh");
+            let mesh = read(&name);
+            assert_eq!((mesh.n_nodes(), mesh.n_elements()), (107, 44), "{name}");
+            assert!((volume(&mesh) - 2.0).abs() < 1e-12, "{name}");
+            assert_eq!(mesh.groups.len(), expected.groups.len());
+            for group in &expected.groups {
+                let same = mesh
+                    .group(&group.name)
+                    .unwrap_or_else(|| panic!("{name}: {}", group.name));
+                assert_eq!(same.dimension, group.dimension);
+                assert_eq!(
+                    places(&mesh, &same.nodes),
+                    places(&expected, &group.nodes),
+                    "{name}: {}",
+                    group.name
+                );
+                let counts = |g: &fem::Group| (g.lines.len(), g.faces.len(), g.elements.len());
+                assert_eq!(counts(same), counts(group), "{name}: {}", group.name);
+            }
+        }
     }
 }
 
 #[test]
+fn groups_of_points_and_curves_hold_their_nodes_at_every_order() {
+    let mesh = read("groups-version4.1-ascii.msh");
+    let rim = mesh.group("rim").unwrap();
+    assert_eq!((rim.dimension, rim.lines.len(), rim.nodes.len()), (1, 4, 8));
+    let corners = mesh.group("corners").unwrap();
+    assert_eq!((corners.dimension, corners.nodes.len()), (0, 2));
+    for order in [Order::Linear, Order::Quadratic, Order::Cubic] {
+        let other = mesh.with_order(order).unwrap();
+        for mesh in [&other, &other.refined().unwrap()] {
+            let rim = &mesh.group("rim").unwrap();
+            // The four edges of the square at x = 0, and all nodes there.
+            let on_edge = |x: f64| x.abs() < 1e-12 || (x - 1.0).abs() < 1e-12;
+            let expected: Vec<u32> = (0..mesh.n_nodes() as u32)
+                .filter(|n| {
+                    let [x, y, z] = mesh.nodes[*n as usize];
+                    x.abs() < 1e-12 && (on_edge(y) || on_edge(z))
+                })
+                .collect();
+            assert_eq!(rim.nodes, expected);
+            let n_lines = if mesh.n_elements() > 44 { 8 } else { 4 };
+            assert_eq!(rim.lines.len(), n_lines);
+            assert!(
+                rim.lines
+                    .iter()
+                    .all(|line| line.len() == order as usize + 1)
+            );
+            assert_eq!(mesh.group("corners").unwrap().nodes.len(), 2);
+        }
+    }
+}
+
+#[test]
+fn groups_of_one_name_are_one_and_that_is_said() {
+    for version in ["2.2", "4.0", "4.1"] {
+        // The face x = 2 has no name in the file: Gmsh writes a name once, other programs and editors do not mind.
+        let name = format!("groups-version{version}-ascii.msh");
+        let text = std::fs::read_to_string(data(&name)).unwrap();
+        assert!(read(&name).group("group-4").is_some());
+        assert!(read(&name).shared_names.is_empty());
+        let text = text.replacen("\n5\n0 1 ", "\n6\n2 4 \"ends\"\n0 1 ", 1);
+        let mesh = gmsh::read_bytes(text.as_bytes(), Path::new(&name)).unwrap();
+        let ends = mesh.group("ends").unwrap();
+        assert_eq!(ends.faces.len(), 8);
+        let at = |x: f64| {
+            ends.nodes
+                .iter()
+                .filter(|n| (mesh.nodes[**n as usize][0] - x).abs() < 1e-12)
+                .count()
+        };
+        assert_eq!((at(0.0), at(2.0)), (13, 13), "{version}");
+        assert_eq!(mesh.shared_names, [("ends".to_owned(), 2)]);
+        let raised = mesh.with_order(Order::Cubic).unwrap();
+        assert_eq!(raised.shared_names, mesh.shared_names);
+    }
+}
+
+#[test]
+fn white_space_and_remarks_change_nothing() {
+    let text = std::fs::read_to_string(data("box-order1-ascii.msh")).unwrap();
+    let expected = read("box-order1-ascii.msh");
+    let names = "2 1 \"left side\"\n";
+    assert!(text.contains(names));
+    let remark = "$Comments\nmade by $hand, $Nodes and all\n$EndComments\n";
+    for spelled in [
+        format!("{remark}{text}"),
+        format!("{text}{remark}"),
+        format!("\u{feff}\n{text}"),
+        text.replace(names, "2\t1\t\"left side\"\n"),
+        text.replace(names, "  2   1 \t \"left side\" \t\n"),
+        text.replace('\n', "\r\n"),
+    ] {
+        let mesh = gmsh::read_bytes(spelled.as_bytes(), Path::new("box.msh")).unwrap();
+        assert_eq!(mesh, expected);
+    }
+    // White space in a name is part of it.
+    let tab = text.replace("left side", "left\tside");
+    let mesh = gmsh::read_bytes(tab.as_bytes(), Path::new("box.msh")).unwrap();
+    assert!(mesh.group("left\tside").is_some());
+}
+
+#[test]
+fn other_versions_name_the_command_that_converts() {
+    let text = std::fs::read_to_string(data("box-order1-ascii.msh")).unwrap();
+    let version_1 = "$NOD\n1\n1 0 0 0\n$ENDNOD\n$ELM\n0\n$ENDELM\n";
+    for (text, version) in [
+        (version_1.to_owned(), "1"),
+        (text.replace("4.1 0 8", "3 0 8"), "3"),
+        (text.replace("4.1 0 8", "5.0 0 8"), "5.0"),
+        (text.replace("4.1 0 8", "4 1 8"), "4 in binary"),
+    ] {
+        let error = gmsh::read_bytes(text.as_bytes(), Path::new("part.msh")).unwrap_err();
+        assert!(
+            matches!(&error, Error::Version { found, .. } if found == version),
+            "{error}"
+        );
+        let command = "`gmsh part.msh -save -format msh41 -o part.msh`";
+        assert!(error.to_string().contains(command), "{error}");
+    }
+}
+
+#[test]
+fn volume_in_no_group_is_named_as_that() {
+    for version in ["2.2", "4.0", "4.1"] {
+        let name = format!("no-volume-version{version}.msh");
+        let error = gmsh::read(&data(&name)).unwrap_err();
+        assert!(matches!(error, Error::VolumeInNoGroup { .. }), "{error}");
+        let told = error.to_string();
+        assert!(told.contains("Physical Volume(\"body\") = {1};"), "{told}");
+    }
+    // A volume in a group that is not meshed.
+    let text = std::fs::read_to_string(data("no-volume-version4.1.msh")).unwrap();
+    let volume = text
+        .lines()
+        .find(|line| line.ends_with(" 0 6 -1 2 -3 4 -5 6 "))
+        .unwrap();
+    let grouped = text.replace(volume, &volume.replace(" 0 6 -1", " 1 1 6 -1"));
+    let error = gmsh::read_bytes(grouped.as_bytes(), Path::new("box.msh")).unwrap_err();
+    assert!(matches!(error, Error::NoTetrahedra { .. }), "{error}");
+}
+
+#[test]
 fn a_file_that_is_cut_anywhere_is_refused() {
-    for name in ["box-order2-ascii.msh", "box-order2-binary.msh"] {
-        let bytes = std::fs::read(data(name)).unwrap();
+    let mut names = vec![
+        "box-order2-ascii.msh".to_owned(),
+        "box-order2-binary.msh".to_owned(),
+    ];
+    names.extend(VERSIONS.map(|version| format!("groups-partitioned{version}.msh")));
+    for name in names {
+        let bytes = std::fs::read(data(&name)).unwrap();
         for len in (0..bytes.len() - 12).step_by(7) {
-            let result = gmsh::read_bytes(&bytes[..len], Path::new(name));
+            let result = gmsh::read_bytes(&bytes[..len], Path::new(&name));
             assert!(result.is_err(), "{name} cut to {len} bytes");
+        }
+    }
+}
+
+/// One byte another: a mesh whose numbers are in range, or a refusal; never a panic and no hang.
+#[test]
+fn damaged_bytes_are_answered() {
+    let mut names = vec!["box-parametric-binary.msh".to_owned()];
+    names.extend(VERSIONS.map(|version| format!("groups-partitioned{version}.msh")));
+    for name in names {
+        let bytes = std::fs::read(data(&name)).unwrap();
+        for at in 0..bytes.len() {
+            let other = [0, b' ', b'-', b'9', 0x7f, 0xff][at % 6];
+            let mut damaged = bytes.clone();
+            damaged[at] = other;
+            if let Ok(mesh) = gmsh::read_bytes(&damaged, Path::new(&name)) {
+                let n = mesh.n_nodes() as u32;
+                assert!(mesh.elements.iter().all(|node| *node < n));
+                assert!(
+                    mesh.groups
+                        .iter()
+                        .flat_map(|g| &g.nodes)
+                        .all(|node| *node < n)
+                );
+            }
         }
     }
 }

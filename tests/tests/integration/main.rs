@@ -15,6 +15,7 @@ mod multiply;
 mod p_method;
 mod plausibility;
 mod random_scenes;
+mod readers;
 mod report;
 mod scenes;
 mod shape_on_gpu;

@@ -4,29 +4,22 @@ use super::warning;
 use crate::prepare::LoadedPart;
 use crate::report::Warning;
 
-/// A group that the scene names and of which the mesh has two: only one of them is used.
+/// A group that the scene names and of which the mesh has several: all of them are used.
 pub(super) fn same_name(loaded: &LoadedPart) -> Option<Warning> {
     let spec = &loaded.spec;
     let named = spec.fixed.iter().map(|(group, _)| group);
     named.chain(&spec.contact).find_map(|group| {
-        let used = loaded.mesh.group(&group.name)?;
-        let alike = loaded
-            .mesh
-            .groups
-            .iter()
-            .filter(|g| g.name == group.name && g.dimension == used.dimension);
-        let n = alike.count();
-        (n > 1).then(|| {
-            warning(
-                "group-names",
-                n as f64,
-                format!(
-                    "{}: the mesh has {n} groups named {:?} and only the first of them is used; give each a name of its \
-                     own and list both in the scene",
-                    group.place, group.name
-                ),
-            )
-        })
+        let mut shared = loaded.mesh.shared_names.iter();
+        let (_, n) = shared.find(|(name, _)| *name == group.name)?;
+        Some(warning(
+            "group-names",
+            *n as f64,
+            format!(
+                "{}: the mesh has {n} groups named {:?}, which are taken as one; if you mean one of them, give each a \
+                 name of its own",
+                group.place, group.name
+            ),
+        ))
     })
 }
 
@@ -42,8 +35,7 @@ mod tests {
         let scene = Scene::load(&folder.join("clip.toml")).unwrap();
         let mut loaded = prepare::load(&setup::part_spec(&scene).unwrap()).unwrap();
         assert_eq!(same_name(&loaded), None);
-        let again = loaded.mesh.group("contact").unwrap().clone();
-        loaded.mesh.groups.push(again);
+        loaded.mesh.shared_names.push(("contact".to_owned(), 2));
         let told = same_name(&loaded).unwrap();
         assert_eq!(told.number, Some(2.0));
         assert!(told.text.contains("clip.toml:17"), "{}", told.text);

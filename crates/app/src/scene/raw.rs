@@ -161,7 +161,8 @@ pub(super) struct SceneRaw {
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct PartRaw {
-    /// Gmsh mesh (`.msh`, version 4.1, ASCII or binary) of tetrahedra, relative to the scene file.
+    /// Gmsh mesh (`.msh`, version 2 or 4, text or binary, whole or partitioned) of tetrahedra, relative to the scene
+    /// file. The volume must be in a physical group, or Gmsh does not save its elements.
     pub(super) mesh: At<String>,
     /// Order of the elements, 1, 2 or 3. Another one than the mesh's own raises or lowers it; new
     /// nodes lie on the mesh's curved edges and faces. The same as `accuracy.order`.
@@ -174,8 +175,8 @@ pub(super) struct PartRaw {
     pub(super) other_meshes: Vec<String>,
     /// Material of the part; may be its own section `[part.material]`.
     pub(super) material: MaterialRaw,
-    /// What is held: the name of a physical group of the mesh, or a list of names and of tables
-    /// with `group` and `components`, such as `{ group = "symmetry", components = ["x"] }`.
+    /// What is held: the name of a physical group of the mesh (of volumes, surfaces, curves or points), or a list of
+    /// names and of tables with `group` and `components`, such as `{ group = "symmetry", components = ["x"] }`.
     pub(super) fixed: At<FixedRaw>,
     /// What can touch the tool: the name of a physical group, or a list of names.
     pub(super) contact: At<NamesRaw>,
@@ -407,7 +408,9 @@ pub(super) struct ToolRaw {
     /// Half of each edge of a box, along local x, y, z, above 0.
     #[schemars(extend("x-quantity" = "length", "x-default" = "by shape"))]
     pub(super) half_extents: Option<At<Vector<3>>>,
-    /// STL or OBJ file of a mesh, closed and with outward triangles, relative to the scene file.
+    /// STL (text or binary, all its solids) or OBJ file of a closed mesh, relative to the scene file. Corners that
+    /// round-off holds apart, by up to 1e-6 of the size, are joined where that closes it; triangles the wrong way are
+    /// turned; polygons may be concave. What was changed is told.
     #[schemars(extend("x-default" = "by shape"))]
     pub(super) file: Option<At<String>>,
     /// Factor from the coordinates of `file` to the scene's length unit, above 0.

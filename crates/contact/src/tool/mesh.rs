@@ -5,7 +5,9 @@
 //! Source: Bærentzen and Aanæs, Signed distance computation using the angle weighted pseudonormal (2005).
 
 mod file;
+mod nesting;
 mod topology;
+mod weld;
 
 use std::path::Path;
 
@@ -14,7 +16,7 @@ use parry3d_f64::query::PointQueryWithLocation;
 use parry3d_f64::shape::{TriMesh, TriMeshFlags, TrianglePointLocation};
 
 use super::{ContactPoint, unit_or};
-use crate::error::{Error, check_positive};
+use crate::error::{Coordinates, Error, check_positive};
 
 /// Closed, outward oriented triangle mesh.
 #[derive(Debug, Clone)]
@@ -28,10 +30,15 @@ pub struct Mesh {
 }
 
 /// What was changed in a mesh before use. Say it to the user.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct MeshRepair {
     /// Vertices at the same place that became one (an STL file has three per triangle).
     pub n_merged_vertices: usize,
+    /// Vertices that differed from another one by round-off and became one with it, because the surface is closed only
+    /// so: seams that a modelling program computed twice.
+    pub n_welded_vertices: usize,
+    /// m: the farthest that one of them was moved along an axis.
+    pub weld_distance: f64,
     /// Triangles left out because two of their vertices are the same.
     pub n_removed_triangles: usize,
     /// Triangles turned round to agree with their neighbours.
@@ -47,7 +54,10 @@ impl Mesh {
     /// A mesh that is empty, not finite, open, not manifold, not orientable, or without volume, each by name
     /// and place.
     pub fn new(vertices: &[DVec3], triangles: &[[u32; 3]]) -> Result<Self, Error> {
-        let closed = topology::close(vertices, triangles)?;
+        Self::of_closed(topology::close(vertices, triangles, Coordinates::Metres)?)
+    }
+
+    fn of_closed(closed: topology::Closed) -> Result<Self, Error> {
         let (mut min, mut max) = (closed.vertices[0], closed.vertices[0]);
         for &vertex in &closed.vertices {
             min = min.min(vertex);
@@ -75,17 +85,20 @@ impl Mesh {
 
     /// From an `.stl` (text or binary) or `.obj` file; `metres_per_unit` is 0.001 for a file in mm.
     ///
-    /// Coordinates pass through f32, as STL stores them: 1e-7 of the size.
+    /// Text keeps its digits; binary STL stores f32, 1e-7 of the size. All solids of a file are read.
     ///
     /// # Errors
-    /// [`Error::MeshFile`], [`Error::MeshFormat`], [`Error::NotPositive`], and those of [`Mesh::new`].
+    /// [`Error::MeshFile`], [`Error::MeshFormat`], [`Error::NotPositive`], and those of [`Mesh::new`] with places
+    /// in the file's coordinates.
     pub fn read(path: &Path, metres_per_unit: f64) -> Result<Self, Error> {
         check_positive("metres per mesh unit", metres_per_unit)?;
-        let (mut vertices, triangles) = file::read(path)?;
-        for vertex in &mut vertices {
+        let (vertices, triangles) = file::read(path)?;
+        let mut closed = topology::close(&vertices, &triangles, Coordinates::OfFile)?;
+        for vertex in &mut closed.vertices {
             *vertex *= metres_per_unit;
         }
-        Self::new(&vertices, &triangles)
+        closed.repair.weld_distance *= metres_per_unit;
+        Self::of_closed(closed)
     }
 
     /// What was changed on the way in.

@@ -1,25 +1,29 @@
-//! Gmsh MSH 4.1, ASCII and binary.
+//! Gmsh MSH 2 and 4, text and binary.
 //!
 //! Read by hand: the available library drops physical names, assumes consecutive node tags
 //! instead of reading them, and panics on some damaged files.
 //!
-//! Source: Gmsh reference manual, "MSH file format" (version 4.1).
+//! Source: Gmsh reference manual, "MSH file format" (version 4.1) and "Legacy formats" (4.0, 2).
 
+mod build;
+mod kind;
 mod reader;
+mod version2;
+mod version4;
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::path::Path;
 
-use super::{Face, Group, Mesh};
+use super::Mesh;
 use crate::Error;
-use crate::element::Order;
+use kind::Kind;
 use reader::Reader;
 
 /// Reads a mesh file.
 ///
 /// # Errors
 /// [`Error::Format`] with the place in the file, [`Error::Version`], [`Error::NoTetrahedra`],
-/// [`Error::MixedOrders`], [`Error::CoordinateNotFinite`].
+/// [`Error::VolumeInNoGroup`], [`Error::MixedOrders`], [`Error::CoordinateNotFinite`].
 pub fn read(path: &Path) -> Result<Mesh, Error> {
     let bytes = std::fs::read(path).map_err(|e| Error::Format {
         place: "opening the file".to_owned(),
@@ -34,21 +38,29 @@ pub fn read(path: &Path) -> Result<Mesh, Error> {
 /// As [`read`].
 pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Mesh, Error> {
     let mut reader = Reader::new(bytes);
+    let mut version = None;
     let mut file = File::default();
-    let mut seen_format = false;
     while let Some(section) = reader.section()? {
-        if !seen_format && section != "MeshFormat" {
-            return Err(reader.wrong_line("is no Gmsh mesh: it does not begin with $MeshFormat"));
-        }
-        match section.as_str() {
-            "MeshFormat" => {
-                read_format(&mut reader, path)?;
-                seen_format = true;
+        match (section.as_str(), version) {
+            ("NOD" | "NOE", None) => return Err(other_version("1", path)),
+            ("MeshFormat", _) => version = Some(read_format(&mut reader, path)?),
+            ("Nodes" | "Elements" | "Entities" | "PartitionedEntities", None) => {
+                return Err(reader.wrong_line(
+                    "is no Gmsh mesh: $MeshFormat is to come before the first section with numbers",
+                ));
             }
-            "PhysicalNames" => file.read_names(&mut reader)?,
-            "Entities" => file.read_entities(&mut reader)?,
-            "Nodes" => file.read_nodes(&mut reader)?,
-            "Elements" => file.read_elements(&mut reader)?,
+            ("PhysicalNames", _) => file.read_names(&mut reader)?,
+            ("Nodes", Some(Version::V2)) => file.read_nodes_2(&mut reader)?,
+            ("Elements", Some(Version::V2)) => file.read_elements_2(&mut reader)?,
+            ("ParametricNodes", Some(Version::V2)) => {
+                return Err(reader.wrong_line(
+                    "holds parametric nodes, which are not read; save the mesh without them (Mesh.SaveParametric = 0)",
+                ));
+            }
+            ("Entities", Some(v)) => file.read_entities(&mut reader, v)?,
+            ("PartitionedEntities", Some(v)) => file.read_partitioned_entities(&mut reader, v)?,
+            ("Nodes", Some(v)) => file.read_nodes_4(&mut reader, v)?,
+            ("Elements", Some(v)) => file.read_elements_4(&mut reader, v)?,
             _ => {
                 reader.skip_section(&section)?;
                 continue;
@@ -56,33 +68,50 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Mesh, Error> {
         }
         reader.end_of(&section)?;
     }
-    if !seen_format {
-        return Err(reader.wrong("is no Gmsh mesh: it is empty"));
+    if version.is_none() {
+        return Err(reader.wrong("is no Gmsh mesh: it is empty or has no $MeshFormat"));
     }
     file.into_mesh()
 }
 
-fn read_format(reader: &mut Reader<'_>, path: &Path) -> Result<(), Error> {
-    let version = reader.word()?;
-    if version != "4.1" {
-        let file = path
-            .file_name()
-            .unwrap_or(path.as_os_str())
-            .to_string_lossy()
-            .into_owned();
-        return Err(Error::Version {
-            found: version,
-            file,
-        });
+/// How numbers and tags are laid out.
+#[derive(Clone, Copy, PartialEq, Eq, Default)]
+enum Version {
+    /// 2 to 2.2: every element says its group.
+    V2,
+    /// Tags are 32-bit, nodes and their tags alternate.
+    V40,
+    #[default]
+    V41,
+}
+
+fn other_version(found: &str, path: &Path) -> Error {
+    let file = path.file_name().unwrap_or(path.as_os_str());
+    Error::Version {
+        found: found.to_owned(),
+        file: file.to_string_lossy().into_owned(),
     }
+}
+
+fn read_format(reader: &mut Reader<'_>, path: &Path) -> Result<Version, Error> {
+    let found = reader.word()?;
+    let version = match found.as_str() {
+        "2" | "2.0" | "2.1" | "2.2" => Version::V2,
+        "4" | "4.0" => Version::V40,
+        "4.1" => Version::V41,
+        _ => return Err(other_version(&found, path)),
+    };
     let is_binary = reader.word()? == "1";
+    if is_binary && version == Version::V40 {
+        return Err(other_version(&format!("{found} in binary"), path));
+    }
     if reader.word()? != "8" {
         return Err(reader.wrong("has a data size other than 8 bytes; save it with a 64-bit Gmsh"));
     }
     if is_binary {
         reader.begin_binary()?;
     }
-    Ok(())
+    Ok(version)
 }
 
 /// Sections of the file as they stand there.
@@ -94,284 +123,53 @@ struct File {
     node_tags: Vec<u64>,
     nodes: Vec<[f64; 3]>,
     blocks: Vec<Block>,
+    /// Whether an element stands there once for each of its groups.
+    repeats_elements: bool,
 }
 
+/// Elements that have kind and groups in common.
 struct Block {
-    entity: (i32, i32),
+    groups: GroupsOf,
     kind: Kind,
     tags: Vec<u64>,
     nodes: Vec<u64>,
 }
 
-#[derive(Clone, Copy, PartialEq)]
-enum Kind {
-    Triangle(Order),
-    Tetrahedron(Order),
-    Other(i32),
-}
-
-/// Gmsh's element types: kind and number of nodes.
-fn kind_of(element_type: i32) -> Option<(Kind, usize)> {
-    Some(match element_type {
-        2 => (Kind::Triangle(Order::Linear), 3),
-        9 => (Kind::Triangle(Order::Quadratic), 6),
-        21 => (Kind::Triangle(Order::Cubic), 10),
-        4 => (Kind::Tetrahedron(Order::Linear), 4),
-        11 => (Kind::Tetrahedron(Order::Quadratic), 10),
-        29 => (Kind::Tetrahedron(Order::Cubic), 20),
-        // Points and lines carry nothing that is needed; other solids are counted and refused.
-        1 => (Kind::Other(1), 2),
-        3 => (Kind::Other(3), 4),
-        5 => (Kind::Other(5), 8),
-        6 => (Kind::Other(6), 6),
-        7 => (Kind::Other(7), 5),
-        8 => (Kind::Other(8), 3),
-        10 => (Kind::Other(10), 9),
-        12 => (Kind::Other(12), 27),
-        13 => (Kind::Other(13), 18),
-        14 => (Kind::Other(14), 14),
-        15 => (Kind::Other(15), 1),
-        16 => (Kind::Other(16), 8),
-        17 => (Kind::Other(17), 20),
-        18 => (Kind::Other(18), 15),
-        19 => (Kind::Other(19), 13),
-        23 => (Kind::Other(23), 15),
-        26 => (Kind::Other(26), 4),
-        27 => (Kind::Other(27), 5),
-        28 => (Kind::Other(28), 6),
-        30 => (Kind::Other(30), 35),
-        31 => (Kind::Other(31), 56),
-        _ => return None,
-    })
-}
-
-/// Names of solids that are not tetrahedra of order 1 to 3.
-fn solid_name(element_type: i32) -> Option<&'static str> {
-    match element_type {
-        5 | 12 | 17 => Some("hexahedra"),
-        6 | 13 | 18 => Some("prisms"),
-        7 | 14 | 19 => Some("pyramids"),
-        30 | 31 => Some("tetrahedra of order 4 or 5"),
-        _ => None,
-    }
+/// Where the groups of a block are said.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum GroupsOf {
+    /// With the entity of this dimension and tag.
+    Entity(i32, i32),
+    /// Here: one physical tag, 0 for none.
+    Tag(i32),
 }
 
 impl File {
+    /// Text also in binary files.
     fn read_names(&mut self, reader: &mut Reader<'_>) -> Result<(), Error> {
-        // Text also in binary files.
-        let n = reader.text_line()?.trim().parse::<usize>().unwrap_or(0);
+        let n = reader.text_line()?;
+        let Ok(n) = n.trim().parse::<usize>() else {
+            return Err(reader.wrong_line("the number of physical names was expected"));
+        };
         for _ in 0..n {
             let line = reader.text_line()?;
-            let mut parts = line.trim().splitn(3, ' ');
-            let dimension = parts.next().and_then(|s| s.parse().ok());
-            let tag = parts.next().and_then(|s| s.parse().ok());
-            let (Some(dimension), Some(tag), Some(name)) = (dimension, tag, parts.next()) else {
+            let Some((dimension, tag, name)) = physical_name(&line) else {
                 return Err(reader.wrong_line("a physical name needs dimension, tag and \"name\""));
             };
-            self.names
-                .insert((dimension, tag), name.trim().trim_matches('"').to_owned());
+            self.names.insert((dimension, tag), name.to_owned());
         }
         Ok(())
     }
+}
 
-    fn read_entities(&mut self, reader: &mut Reader<'_>) -> Result<(), Error> {
-        let mut counts = [0; 4];
-        for count in &mut counts {
-            *count = reader.count(8)?;
-        }
-        for (dimension, count) in (0..).zip(counts) {
-            for _ in 0..count {
-                let tag = reader.int()?;
-                for _ in 0..if dimension == 0 { 3 } else { 6 } {
-                    reader.float()?;
-                }
-                let n = reader.count(4)?;
-                // Gmsh makes the tag negative where a group reverses the entity.
-                let physical = (0..n)
-                    .map(|_| reader.int().map(i32::saturating_abs))
-                    .collect::<Result<Vec<_>, _>>()?;
-                self.physical.insert((dimension, tag), physical);
-                if dimension > 0 {
-                    for _ in 0..reader.count(4)? {
-                        reader.int()?;
-                    }
-                }
-            }
-        }
-        Ok(())
-    }
-
-    fn read_nodes(&mut self, reader: &mut Reader<'_>) -> Result<(), Error> {
-        let n_blocks = reader.count(1)?;
-        for _ in 0..3 {
-            reader.size()?;
-        }
-        for _ in 0..n_blocks {
-            let dimension = reader.int()?;
-            reader.int()?;
-            let is_parametric = reader.int()? != 0;
-            let n = reader.count(8)?;
-            for _ in 0..n {
-                self.node_tags.push(reader.size()?);
-            }
-            for _ in 0..n {
-                self.nodes
-                    .push([reader.float()?, reader.float()?, reader.float()?]);
-                for _ in 0..if is_parametric {
-                    dimension.clamp(0, 3)
-                } else {
-                    0
-                } {
-                    reader.float()?;
-                }
-            }
-        }
-        Ok(())
-    }
-
-    fn read_elements(&mut self, reader: &mut Reader<'_>) -> Result<(), Error> {
-        let n_blocks = reader.count(1)?;
-        for _ in 0..3 {
-            reader.size()?;
-        }
-        for _ in 0..n_blocks {
-            let entity = (reader.int()?, reader.int()?);
-            let element_type = reader.int()?;
-            let Some((kind, n_nodes)) = kind_of(element_type) else {
-                return Err(reader.wrong(&format!(
-                    "element type {element_type} is not known; only tetrahedra of order 1, 2 and 3 are used"
-                )));
-            };
-            let n = reader.count(8)?;
-            let mut block = Block {
-                entity,
-                kind,
-                tags: Vec::new(),
-                nodes: Vec::new(),
-            };
-            for _ in 0..n {
-                block.tags.push(reader.size()?);
-                for _ in 0..n_nodes {
-                    block.nodes.push(reader.size()?);
-                }
-            }
-            self.blocks.push(block);
-        }
-        Ok(())
-    }
-
-    fn into_mesh(self) -> Result<Mesh, Error> {
-        let mut node_of_tag: HashMap<u64, u32> = HashMap::with_capacity(self.nodes.len());
-        for (i, (&tag, x)) in self.node_tags.iter().zip(&self.nodes).enumerate() {
-            if !x.iter().all(|c| c.is_finite()) {
-                return Err(Error::CoordinateNotFinite { tag });
-            }
-            if node_of_tag.insert(tag, i as u32).is_some() {
-                return Err(in_mesh(format!("node {tag} is there twice")));
-            }
-        }
-        let order = self.order()?;
-        let mut elements = Vec::new();
-        let mut element_tags = Vec::new();
-        let mut groups: BTreeMap<(i32, i32), Group> = BTreeMap::new();
-        for block in &self.blocks {
-            let (dimension, n_nodes) = match block.kind {
-                Kind::Triangle(o) if o == order => (2, order.nodes_per_face()),
-                Kind::Tetrahedron(_) => (3, order.nodes_per_element()),
-                _ => continue,
-            };
-            let physical = self
-                .physical
-                .get(&block.entity)
-                .map_or(&[][..], Vec::as_slice);
-            for (tag, nodes) in block.tags.iter().zip(block.nodes.chunks_exact(n_nodes)) {
-                let indices: Vec<u32> = nodes
-                    .iter()
-                    .map(|node| {
-                        node_of_tag.get(node).copied().ok_or_else(|| {
-                            in_mesh(format!(
-                                "element {tag} names node {node}, which is not in the file"
-                            ))
-                        })
-                    })
-                    .collect::<Result<_, _>>()?;
-                for &p in physical {
-                    let group = groups.entry((dimension, p)).or_insert_with(|| Group {
-                        name: self
-                            .names
-                            .get(&(dimension, p))
-                            .cloned()
-                            .unwrap_or_else(|| format!("group-{p}")),
-                        dimension: dimension as u8,
-                        nodes: Vec::new(),
-                        faces: Vec::new(),
-                        elements: Vec::new(),
-                    });
-                    group.nodes.extend(&indices);
-                    if dimension == 2 {
-                        group.faces.push(Face {
-                            nodes: indices.clone(),
-                        });
-                    } else {
-                        group.elements.push(element_tags.len() as u32);
-                    }
-                }
-                if dimension == 3 {
-                    elements.extend(indices);
-                    element_tags.push(*tag);
-                }
-            }
-        }
-        let groups = groups
-            .into_values()
-            .map(|mut group| {
-                group.nodes.sort_unstable();
-                group.nodes.dedup();
-                // Older files list a triangle once for each group that it is in.
-                let mut seen = std::collections::HashSet::new();
-                group.faces.retain(|f| {
-                    let mut key = f.nodes.clone();
-                    key.sort_unstable();
-                    seen.insert(key)
-                });
-                group
-            })
-            .collect();
-        Ok(Mesh::new(
-            order,
-            self.nodes,
-            self.node_tags,
-            elements,
-            element_tags,
-            groups,
-        ))
-    }
-
-    /// The one order of all tetrahedra; other solids are refused.
-    fn order(&self) -> Result<Order, Error> {
-        let mut order = None;
-        let mut others = Vec::new();
-        for block in self.blocks.iter().filter(|b| !b.tags.is_empty()) {
-            match block.kind {
-                Kind::Tetrahedron(o) => match order {
-                    Some(first) if first != o => {
-                        return Err(Error::MixedOrders(first as u8, o as u8));
-                    }
-                    _ => order = Some(o),
-                },
-                Kind::Other(t) => others.extend(solid_name(t)),
-                Kind::Triangle(_) => {}
-            }
-        }
-        match (order, others.first()) {
-            (Some(order), None) => Ok(order),
-            (_, found) => Err(Error::NoTetrahedra {
-                found: found
-                    .map(|name| format!(" alone: it has {name}"))
-                    .unwrap_or_default(),
-            }),
-        }
-    }
+/// Dimension, tag and name, with any white space between them; the name may hold some too.
+fn physical_name(line: &str) -> Option<(i32, i32, &str)> {
+    let (dimension, rest) = line.trim().split_once(char::is_whitespace)?;
+    let (tag, name) = rest.trim_start().split_once(char::is_whitespace)?;
+    let name = name.trim();
+    let inner = name.strip_prefix('"').and_then(|n| n.strip_suffix('"'));
+    let name = inner.unwrap_or(name);
+    Some((dimension.parse().ok()?, tag.parse().ok()?, name))
 }
 
 fn in_mesh(what: String) -> Error {

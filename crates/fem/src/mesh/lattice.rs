@@ -118,6 +118,11 @@ impl<'a> Lattice<'a> {
                     name: old.name.clone(),
                     dimension: old.dimension,
                     nodes: Vec::new(),
+                    lines: old
+                        .lines
+                        .iter()
+                        .flat_map(|line| self.lines(line, order))
+                        .collect(),
                     faces: Vec::with_capacity(old.faces.len() * faces.len()),
                     elements: Vec::with_capacity(old.elements.len() * children as usize),
                 };
@@ -129,7 +134,7 @@ impl<'a> Lattice<'a> {
                 for &e in &old.elements {
                     group.elements.extend(children * e..children * e + children);
                 }
-                if old.faces.is_empty() && old.elements.is_empty() {
+                if old.faces.is_empty() && old.elements.is_empty() && old.lines.is_empty() {
                     // Only nodes: those that are still there.
                     let stay = old.nodes.iter().filter_map(|&n| self.kept[n as usize]);
                     group.nodes.extend(stay);
@@ -137,6 +142,7 @@ impl<'a> Lattice<'a> {
                     group
                         .nodes
                         .extend(group.faces.iter().flat_map(|f| &f.nodes));
+                    group.nodes.extend(group.lines.iter().flatten());
                     for &e in &group.elements {
                         let first = e as usize * n_local;
                         group.nodes.extend(&elements[first..first + n_local]);
@@ -147,14 +153,32 @@ impl<'a> Lattice<'a> {
                 Ok(group)
             })
             .collect::<Result<Vec<Group>, Error>>()?;
-        Ok(Mesh::new(
+        let mut mesh = Mesh::new(
             order,
             self.nodes,
             self.node_tags,
             elements,
             element_tags,
             groups,
-        ))
+        );
+        mesh.shared_names.clone_from(&self.old.shared_names);
+        Ok(mesh)
+    }
+
+    /// The lines that take the place of an old one; none for a line that is the edge of no element.
+    fn lines(&self, old: &[u32], order: Order) -> Vec<Vec<u32>> {
+        let places = (0..=self.steps).map(|k| [self.steps - k, k]);
+        let nodes: Option<Vec<u32>> = places
+            .map(|place| self.known.get(&key(&old[..2], &place)).copied())
+            .collect();
+        let n_steps = usize::from(order as u8);
+        let of_line = |part: &[u32]| {
+            let ends = [part[0], part[n_steps]];
+            [&ends, &part[1..n_steps]].concat()
+        };
+        let nodes = nodes.unwrap_or_default();
+        let parts = nodes.windows(n_steps + 1).step_by(n_steps);
+        parts.map(of_line).collect()
     }
 
     /// The face with nodes at these places of an old face.

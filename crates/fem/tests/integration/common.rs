@@ -115,6 +115,7 @@ fn group(mesh: &Mesh, name: &str, is_there: &dyn Fn([f64; 3]) -> bool) -> Group 
         name: name.to_owned(),
         dimension: 2,
         nodes,
+        lines: Vec::new(),
         faces,
         elements: vec![],
     }

@@ -137,6 +137,7 @@ pub(crate) fn ring(order: Order, n: usize) -> (Mesh, Supports) {
         name: "inner".to_owned(),
         dimension: 2,
         nodes: inner.into_iter().collect(),
+        lines: Vec::new(),
         faces,
         elements: vec![],
     }];

@@ -283,6 +283,7 @@ fn groups_inside_the_body_are_carried_over() {
                 name: name.to_owned(),
                 dimension: if elements.is_empty() { 2 } else { 3 },
                 nodes,
+                lines: Vec::new(),
                 faces,
                 elements,
             });
@@ -306,6 +307,7 @@ fn groups_inside_the_body_are_carried_over() {
             name: "points".to_owned(),
             dimension: 2,
             nodes: ends,
+            lines: Vec::new(),
             faces: vec![],
             elements: vec![],
         });

@@ -122,6 +122,7 @@ fn nodes_of_no_element_are_left_out() {
             name: "loose".to_owned(),
             dimension: 2,
             nodes: vec![whole.n_nodes() as u32],
+            lines: Vec::new(),
             faces: vec![],
             elements: vec![],
         }],

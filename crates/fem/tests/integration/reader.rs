@@ -88,14 +88,15 @@ fn parametric_coordinates_are_read_over() {
     }
 }
 
+/// Binary or text, old or new: one box of Gmsh's.
 #[test]
-fn binary_version_2_names_the_command_that_converts() {
-    let error = gmsh::read(&crate::common::data("box-version2.2-binary.msh")).unwrap_err();
-    assert_eq!(
-        error.to_string(),
-        "MSH version 2.2 is not read; convert it with `gmsh box-version2.2-binary.msh -save \
-         -format msh41 -o box-version2.2-binary.msh`"
-    );
+fn older_versions_hold_the_same_box() {
+    let expected = read("box-version2.2.msh");
+    assert_eq!((expected.n_nodes(), expected.n_elements()), (22, 44));
+    let binary = read("box-version2.2-binary.msh");
+    assert_eq!(binary.elements, expected.elements);
+    assert_eq!(binary.groups, expected.groups);
+    assert_eq!(read("box-version4.0.msh").elements, expected.elements);
 }
 
 /// Bytes of a binary file turned around: what a machine of the other byte order writes.

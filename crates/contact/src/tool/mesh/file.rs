@@ -1,6 +1,12 @@
 //! STL and OBJ files.
+//!
+//! Read by hand: of the libraries at hand one takes text for binary unless it begins with "solid" and a space, the
+//! other fans concave polygons out and stumbles over lines that say nothing about the shape.
 
-use std::io::BufReader;
+mod obj;
+mod polygon;
+mod stl;
+
 use std::path::Path;
 
 use glam::DVec3;
@@ -8,55 +14,64 @@ use glam::DVec3;
 use crate::error::Error;
 
 /// Vertices in the file's unit, triangles from 0.
-pub(super) fn read(path: &Path) -> Result<(Vec<DVec3>, Vec<[u32; 3]>), Error> {
+pub(super) type Soup = (Vec<DVec3>, Vec<[u32; 3]>);
+
+pub(super) fn read(path: &Path) -> Result<Soup, Error> {
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-    match extension.as_deref() {
-        Some("stl") => read_stl(path),
-        Some("obj") => read_obj(path),
-        _ => Err(Error::MeshFormat {
-            path: path.to_owned(),
-        }),
-    }
-}
-
-fn refused(path: &Path, cause: impl std::fmt::Display) -> Error {
-    Error::MeshFile {
-        path: path.to_owned(),
-        cause: cause.to_string(),
-    }
-}
-
-fn read_stl(path: &Path) -> Result<(Vec<DVec3>, Vec<[u32; 3]>), Error> {
-    let file = std::fs::File::open(path).map_err(|e| refused(path, e))?;
-    let mesh = stl_io::read_stl(&mut BufReader::new(file)).map_err(|e| refused(path, e))?;
-    let vertices = mesh.vertices.iter();
-    let vertices = vertices
-        .map(|v| DVec3::from_array(v.0.map(f64::from)))
-        .collect();
-    let triangles = mesh.faces.iter();
-    let triangles = triangles.map(|t| t.vertices.map(|v| v as u32)).collect();
-    Ok((vertices, triangles))
-}
-
-fn read_obj(path: &Path) -> Result<(Vec<DVec3>, Vec<[u32; 3]>), Error> {
-    let options = tobj::LoadOptions {
-        triangulate: true,
-        ignore_points: true,
-        ignore_lines: true,
-        ..tobj::LoadOptions::default()
+    let parse = match extension.as_deref() {
+        Some("stl") => stl::parse,
+        Some("obj") => obj::parse,
+        _ => {
+            return Err(Error::MeshFormat {
+                path: path.to_owned(),
+            });
+        }
     };
-    let file = std::fs::File::open(path).map_err(|e| refused(path, e))?;
-    // Materials are colours only.
-    let no_materials = |_: &Path| Ok(Default::default());
-    let (models, _) = tobj::load_obj_buf(&mut BufReader::new(file), &options, no_materials)
-        .map_err(|e| refused(path, e))?;
-    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
-    for model in models {
-        let first = vertices.len() as u32;
-        let (points, _) = model.mesh.positions.as_chunks::<3>();
-        vertices.extend(points.iter().map(|p| DVec3::from_array(p.map(f64::from))));
-        let (faces, _) = model.mesh.indices.as_chunks::<3>();
-        triangles.extend(faces.iter().map(|t| t.map(|v| v + first)));
-    }
-    Ok((vertices, triangles))
+    let refused = |cause: String| Error::MeshFile {
+        path: path.to_owned(),
+        cause,
+    };
+    let bytes = std::fs::read(path).map_err(|e| refused(e.to_string()))?;
+    parse(&bytes).map_err(refused)
 }
+
+/// Text of a file whatever its encoding: only names, which are not used, hold more than ASCII.
+fn decode(bytes: &[u8]) -> String {
+    let utf_16 = |of_pair: fn([u8; 2]) -> u16| {
+        let (pairs, _) = bytes[2..].as_chunks::<2>();
+        String::from_utf16_lossy(&pairs.iter().map(|pair| of_pair(*pair)).collect::<Vec<_>>())
+    };
+    match bytes {
+        [0xff, 0xfe, ..] => utf_16(u16::from_le_bytes),
+        [0xfe, 0xff, ..] => utf_16(u16::from_be_bytes),
+        [0xef, 0xbb, 0xbf, rest @ ..] => String::from_utf8_lossy(rest).into_owned(),
+        _ => String::from_utf8_lossy(bytes).into_owned(),
+    }
+}
+
+/// Lines that end as on any system.
+fn lines(text: &str) -> std::str::Split<'_, char> {
+    text.split(if text.contains('\n') { '\n' } else { '\r' })
+}
+
+/// The next three words as a finite point; `what` is named where it is none.
+fn point<'a>(words: &mut impl Iterator<Item = &'a str>, what: &str) -> Result<DVec3, String> {
+    let mut point = [0.0; 3];
+    for x in &mut point {
+        let Some(word) = words.next() else {
+            return Err(format!("a {what} needs three numbers"));
+        };
+        *x = match word.parse::<f64>() {
+            Ok(x) if x.is_finite() => x,
+            Ok(_) => return Err(format!("a {what} is not finite")),
+            Err(_) if word.contains(',') => {
+                return Err(format!("{word:?} is no number; write a decimal point"));
+            }
+            Err(_) => return Err(format!("{word:?} is no number")),
+        };
+    }
+    Ok(DVec3::from_array(point))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,3 +1,5 @@
+mod repair;
+
 use proptest::prelude::*;
 
 use super::*;
@@ -152,6 +154,7 @@ fn broken_meshes_are_refused_with_the_place() {
         start,
         end,
         n_edges: 3,
+        coordinates: Coordinates::Metres,
     } = open
     else {
         panic!("{open}")
@@ -181,7 +184,8 @@ fn broken_meshes_are_refused_with_the_place() {
     assert_eq!(
         touching,
         Error::MeshVertexNotManifold {
-            position: vertices[7]
+            position: vertices[7],
+            coordinates: Coordinates::Metres,
         }
     );
 
@@ -262,15 +266,19 @@ fn files_are_read_in_their_unit() {
     let (vertices, triangles) = brick();
     let folder = tempfile::tempdir().unwrap();
     let stl = folder.path().join("brick.stl");
-    let facets: Vec<_> = triangles
-        .iter()
-        .map(|t| stl_io::Triangle {
-            normal: stl_io::Normal::new([0.0; 3]),
-            vertices: t
-                .map(|v| stl_io::Vertex::new(vertices[v as usize].to_array().map(|x| x as f32))),
-        })
-        .collect();
-    stl_io::write_stl(&mut std::fs::File::create(&stl).unwrap(), facets.iter()).unwrap();
+    let mut bytes = vec![0; 80];
+    bytes.extend((triangles.len() as u32).to_le_bytes());
+    for triangle in &triangles {
+        bytes.extend([0; 12]);
+        for x in triangle
+            .map(|v| vertices[v as usize].to_array())
+            .as_flattened()
+        {
+            bytes.extend((*x as f32).to_le_bytes());
+        }
+        bytes.extend([0; 2]);
+    }
+    std::fs::write(&stl, bytes).unwrap();
     let obj = folder.path().join("brick.OBJ");
     let mut text = String::from("mtllib colours.mtl\no brick\n");
     for v in &vertices {

@@ -5,18 +5,54 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 
 use super::MeshRepair;
-use crate::error::Error;
+use super::nesting::turn_outward;
+use super::weld;
+use crate::error::{Coordinates, Error};
 
 /// A checked surface.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Closed {
     pub(super) vertices: Vec<DVec3>,
     pub(super) triangles: Vec<[u32; 3]>,
     pub(super) repair: MeshRepair,
+    pub(super) coordinates: Coordinates,
 }
 
-pub(super) fn close(vertices: &[DVec3], triangles: &[[u32; 3]]) -> Result<Closed, Error> {
-    let mut mesh = merge(vertices, triangles)?;
+/// Takes the corners as they stand where that gives a closed surface; else those at its faults that differ by no more
+/// than round-off become one, by the least distance that closes it.
+pub(super) fn close(
+    vertices: &[DVec3],
+    triangles: &[[u32; 3]],
+    coordinates: Coordinates,
+) -> Result<Closed, Error> {
+    let exact = merge(vertices, triangles, coordinates)?;
+    let mut refusal = match check(exact.clone()) {
+        Ok(closed) => return Ok(closed),
+        Err(refusal) => refusal,
+    };
+    let at_fault = vertices_at_fault(&exact);
+    for distance in weld::distances(&exact.vertices) {
+        let Some(welded) = weld::weld(&exact, &at_fault, distance) else {
+            continue;
+        };
+        match check(welded) {
+            Ok(closed) => return Ok(closed),
+            // What is left when seams are closed is the fault to mend.
+            Err(less) if n_open(&less) < n_open(&refusal) => refusal = less,
+            Err(_) => {}
+        }
+    }
+    Err(refusal)
+}
+
+fn n_open(refusal: &Error) -> usize {
+    match refusal {
+        Error::MeshOpen { n_edges, .. } => *n_edges,
+        _ => 0,
+    }
+}
+
+fn check(mut mesh: Closed) -> Result<Closed, Error> {
     check_area(&mesh)?;
     let neighbours = pair_edges(&mesh)?;
     check_vertices(&mesh, &neighbours)?;
@@ -26,7 +62,11 @@ pub(super) fn close(vertices: &[DVec3], triangles: &[[u32; 3]]) -> Result<Closed
 }
 
 /// Vertices at the same place become one; triangles that then lose their area go.
-fn merge(vertices: &[DVec3], triangles: &[[u32; 3]]) -> Result<Closed, Error> {
+fn merge(
+    vertices: &[DVec3],
+    triangles: &[[u32; 3]],
+    coordinates: Coordinates,
+) -> Result<Closed, Error> {
     if let Some(index) = vertices.iter().position(|v| !v.is_finite()) {
         return Err(Error::NotFinite {
             what: "tool mesh vertex",
@@ -69,32 +109,56 @@ fn merge(vertices: &[DVec3], triangles: &[[u32; 3]]) -> Result<Closed, Error> {
         vertices: merged,
         triangles: new_triangles,
         repair,
+        coordinates,
     })
 }
 
 impl Closed {
-    fn corners(&self, triangle: usize) -> [DVec3; 3] {
+    pub(super) fn corners(&self, triangle: usize) -> [DVec3; 3] {
         self.triangles[triangle].map(|v| self.vertices[v as usize])
     }
 }
 
-fn check_area(mesh: &Closed) -> Result<(), Error> {
-    /// Twice the area over the longest edge squared: below this the normal is round-off.
+/// Whether the triangle's normal is nothing but round-off.
+fn is_flat([a, b, c]: [DVec3; 3]) -> bool {
+    /// Twice the area over the longest edge squared.
     const FLAT: f64 = 1e-14;
-    for triangle in 0..mesh.triangles.len() {
-        let [a, b, c] = mesh.corners(triangle);
-        let longest = (b - a)
-            .length_squared()
-            .max((c - b).length_squared())
-            .max((a - c).length_squared());
-        if (b - a).cross(c - a).length() <= FLAT * longest {
-            return Err(Error::MeshZeroArea {
-                triangle,
-                position: (a + b + c) / 3.0,
-            });
+    let longest = (b - a)
+        .length_squared()
+        .max((c - b).length_squared())
+        .max((a - c).length_squared());
+    (b - a).cross(c - a).length() <= FLAT * longest
+}
+
+fn check_area(mesh: &Closed) -> Result<(), Error> {
+    let flat = (0..mesh.triangles.len()).find(|&triangle| is_flat(mesh.corners(triangle)));
+    match flat {
+        None => Ok(()),
+        Some(triangle) => Err(Error::MeshZeroArea {
+            triangle,
+            position: mesh.corners(triangle).iter().sum::<DVec3>() / 3.0,
+            coordinates: mesh.coordinates,
+        }),
+    }
+}
+
+/// Ends of edges that are not shared by two triangles, and corners of triangles without area.
+fn vertices_at_fault(mesh: &Closed) -> Vec<bool> {
+    let mut at_fault = vec![false; mesh.vertices.len()];
+    for ((start, end), users) in edge_users(mesh) {
+        if users.len() != 2 {
+            at_fault[start as usize] = true;
+            at_fault[end as usize] = true;
         }
     }
-    Ok(())
+    for (triangle, corners) in mesh.triangles.iter().enumerate() {
+        if is_flat(mesh.corners(triangle)) {
+            for &corner in corners {
+                at_fault[corner as usize] = true;
+            }
+        }
+    }
+    at_fault
 }
 
 /// A triangle at an edge: its number, which of its edges, and whether it runs from the lower to the higher vertex.
@@ -104,7 +168,7 @@ type EdgeUser = (u32, u8, bool);
 /// is wrong.
 type Neighbours = Vec<[(u32, bool); 3]>;
 
-fn pair_edges(mesh: &Closed) -> Result<Neighbours, Error> {
+fn edge_users(mesh: &Closed) -> BTreeMap<(u32, u32), Vec<EdgeUser>> {
     let mut users: BTreeMap<(u32, u32), Vec<EdgeUser>> = BTreeMap::new();
     for (triangle, corners) in mesh.triangles.iter().enumerate() {
         for edge in 0..3 {
@@ -116,6 +180,11 @@ fn pair_edges(mesh: &Closed) -> Result<Neighbours, Error> {
             ));
         }
     }
+    users
+}
+
+fn pair_edges(mesh: &Closed) -> Result<Neighbours, Error> {
+    let users = edge_users(mesh);
     let place = |vertex: u32| mesh.vertices[vertex as usize];
     let mut n_open = 0;
     let mut first_open = None;
@@ -136,6 +205,7 @@ fn pair_edges(mesh: &Closed) -> Result<Neighbours, Error> {
                     start: place(start),
                     end: place(end),
                     n_triangles: users.len(),
+                    coordinates: mesh.coordinates,
                 });
             }
         }
@@ -145,6 +215,7 @@ fn pair_edges(mesh: &Closed) -> Result<Neighbours, Error> {
             start: place(start),
             end: place(end),
             n_edges: n_open,
+            coordinates: mesh.coordinates,
         }),
         None => Ok(neighbours),
     }
@@ -183,6 +254,7 @@ fn check_vertices(mesh: &Closed, neighbours: &Neighbours) -> Result<(), Error> {
         if n_walked != n_expected && n_expected > 0 {
             return Err(Error::MeshVertexNotManifold {
                 position: mesh.vertices[vertex],
+                coordinates: mesh.coordinates,
             });
         }
     }
@@ -216,6 +288,7 @@ fn orient(mesh: &mut Closed, neighbours: &Neighbours) -> Result<Vec<u32>, Error>
                     return Err(Error::MeshNotOrientable {
                         start: corners[edge],
                         end: corners[(edge + 1) % 3],
+                        coordinates: mesh.coordinates,
                     });
                 }
             }
@@ -229,56 +302,4 @@ fn orient(mesh: &mut Closed, neighbours: &Neighbours) -> Result<Vec<u32>, Error>
         }
     }
     Ok(piece)
-}
-
-struct Piece {
-    volume: f64,
-    min: DVec3,
-    max: DVec3,
-}
-
-/// A piece that encloses a negative volume is turned, unless it lies in another one: then it is a cavity.
-fn turn_outward(mesh: &mut Closed, piece_of: &[u32]) -> Result<(), Error> {
-    let n_pieces = piece_of.iter().max().map_or(0, |&last| last as usize + 1);
-    let mut pieces: Vec<Piece> = Vec::new();
-    pieces.resize_with(n_pieces, || Piece {
-        volume: 0.0,
-        min: DVec3::INFINITY,
-        max: DVec3::NEG_INFINITY,
-    });
-    let origin = mesh.vertices[0];
-    for (triangle, &piece) in piece_of.iter().enumerate() {
-        let piece = &mut pieces[piece as usize];
-        let corners = mesh.corners(triangle);
-        let [a, b, c] = corners.map(|corner| corner - origin);
-        piece.volume += a.dot(b.cross(c)) / 6.0;
-        for corner in corners {
-            piece.min = piece.min.min(corner);
-            piece.max = piece.max.max(corner);
-        }
-    }
-    /// Of the cube round the piece: a volume below this is round-off.
-    const EMPTY: f64 = 1e-12;
-    for piece in &pieces {
-        let size = (piece.max - piece.min).max_element();
-        if piece.volume.abs() <= EMPTY * size * size * size {
-            return Err(Error::MeshNoVolume);
-        }
-    }
-    let is_inside_another = |piece: &Piece| {
-        pieces
-            .iter()
-            .any(|other| other.min.cmplt(piece.min).all() && other.max.cmpgt(piece.max).all())
-    };
-    let turn: Vec<bool> = pieces
-        .iter()
-        .map(|piece| piece.volume < 0.0 && !is_inside_another(piece))
-        .collect();
-    mesh.repair.n_inverted_pieces = turn.iter().filter(|&&turn| turn).count();
-    for (corners, &piece) in mesh.triangles.iter_mut().zip(piece_of) {
-        if turn[piece as usize] {
-            corners.swap(1, 2);
-        }
-    }
-    Ok(())
 }

@@ -13,7 +13,12 @@ impl<'a> Reader<'a> {
     pub(super) fn new(bytes: &'a [u8]) -> Self {
         Self {
             bytes,
-            at: 0,
+            // Behind a byte order mark.
+            at: if bytes.starts_with(b"\xef\xbb\xbf") {
+                3
+            } else {
+                0
+            },
             is_binary: false,
             swap: false,
         }
@@ -184,6 +189,10 @@ impl<'a> Reader<'a> {
     /// cannot hold them, so that a damaged count does not ask for all memory.
     pub(super) fn count(&mut self, bytes_each: u64) -> Result<usize, Error> {
         let count = self.size()?;
+        self.fitting(count, bytes_each)
+    }
+
+    fn fitting(&self, count: u64, bytes_each: u64) -> Result<usize, Error> {
         let each = if self.is_binary { bytes_each } else { 2 };
         let left = (self.bytes.len() - self.at) as u64;
         if count
@@ -195,6 +204,30 @@ impl<'a> Reader<'a> {
             )));
         }
         Ok(count as usize)
+    }
+
+    /// A tag of 32 bits, as older versions have them.
+    pub(super) fn tag(&mut self) -> Result<u64, Error> {
+        if !self.is_binary {
+            return self.size();
+        }
+        let tag = self.int()?;
+        u64::try_from(tag).map_err(|_| self.wrong(&format!("{tag} is no tag")))
+    }
+
+    /// As [`Self::count`] for a number that is a line of text in binary files too.
+    pub(super) fn text_count(&mut self, bytes_each: u64) -> Result<usize, Error> {
+        let is_binary = std::mem::replace(&mut self.is_binary, false);
+        let count = self.size();
+        self.is_binary = is_binary;
+        if is_binary {
+            self.text_line()?;
+        }
+        self.fitting(count?, bytes_each)
+    }
+
+    pub(super) fn is_binary(&self) -> bool {
+        self.is_binary
     }
 
     /// A floating-point number.

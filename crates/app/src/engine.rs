@@ -46,6 +46,7 @@ use held::Held;
 use late::Late;
 pub use part::ContactPart;
 use part::Deformed;
+use prune::{GOOD_ENOUGH, MOST_ROUNDS};
 pub use report::{ActiveContact, N_STAGES, Stage, StepReport};
 use scratch::Scratch;
 pub use switch::switch_bound;
@@ -424,6 +425,7 @@ impl Engine {
         let rigid_before = report.rigid_depth;
         let mut tool_pose = self.held.pose(target, &self.deviation);
         let mut change_before = f64::INFINITY;
+        let mut rounds = 0;
         while report.passes < max_passes {
             report.passes += 1;
             let change = self.pass(&mut tool_pose, target, report);
@@ -434,7 +436,8 @@ impl Engine {
             let is_steady =
                 report.passes > 1 && ratio < STEADY && change < 0.01 * self.settings.near_distance;
             let left = 2.0 * change * ratio / (1.0 - ratio);
-            if change <= tolerance || (is_steady && left <= tolerance) {
+            let stand_still = change <= tolerance || (is_steady && left <= tolerance);
+            if stand_still && !self.begins_round(&mut rounds, report) {
                 report.converged = true;
                 break;
             }
@@ -452,6 +455,18 @@ impl Engine {
         let on_faces = self.edges.as_ref().map_or(0, |edges| edges.n_carried());
         report.contacts = (self.scratch.n_own + on_faces) as u32;
         self.balance(target, report);
+    }
+
+    /// Whether nodes that share rows try better shares once more, now that planes stand still.
+    fn begins_round(&mut self, rounds: &mut u32, report: &StepReport) -> bool {
+        let is_good = report.merge_error <= GOOD_ENOUGH * self.settings.merge_tolerance;
+        // As many passes again are left for the last round.
+        if is_good || *rounds == MOST_ROUNDS || 2 * report.passes > MAX_PASSES {
+            return false;
+        }
+        *rounds += 1;
+        self.scratch.prune.begin_round();
+        true
     }
 
     /// Fills in both sides of the tool's equilibrium.

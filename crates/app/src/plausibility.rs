@@ -52,6 +52,7 @@ pub(crate) fn of_part(scene: &Scene, loaded: &LoadedPart) -> Vec<Warning> {
         seam::coincident(&loaded.mesh),
         seam::unmatched(&loaded.mesh),
         groups::same_name(loaded),
+        groups::left_out(loaded),
     ]
     .into_iter()
     .flatten()

@@ -55,6 +55,9 @@ pub struct Mesh {
     /// Names that several physical groups of one dimension have, with how many have it: in [`Mesh::groups`] they are
     /// one group.
     pub shared_names: Vec<(String, usize)>,
+    /// Tags of the volumes that the file names, but in no group and without elements: Gmsh saves only what is in a
+    /// group.
+    pub left_out_volumes: Vec<i32>,
     node_of_tag: HashMap<u64, u32>,
 }
 
@@ -90,6 +93,7 @@ impl Mesh {
             element_tags,
             groups,
             shared_names: Vec::new(),
+            left_out_volumes: Vec::new(),
             node_of_tag,
         }
     }

@@ -195,6 +195,28 @@ fn groups_of_one_name_are_one_and_that_is_said() {
     }
 }
 
+/// A second volume that is in the model and in no group: Gmsh lists it and saves none of its elements.
+#[test]
+fn a_volume_of_which_the_file_has_no_elements_is_told() {
+    let text = std::fs::read_to_string(data("box-order1-ascii.msh")).unwrap();
+    let read = |text: &str| gmsh::read_bytes(text.as_bytes(), Path::new("box.msh")).unwrap();
+    assert!(read(&text).left_out_volumes.is_empty());
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    let counts = 1 + lines.iter().position(|l| l == "$Entities").unwrap();
+    let mut numbers: Vec<&str> = lines[counts].split_whitespace().collect();
+    assert_eq!(numbers[3], "1");
+    numbers[3] = "2";
+    lines[counts] = numbers.join(" ");
+    let end = lines.iter().position(|l| l == "$EndEntities").unwrap();
+    lines.insert(end, "7 5 0 0 6 1 1 0 0 ".to_owned());
+    let mesh = read(&(lines.join("\n") + "\n"));
+    assert_eq!(mesh.left_out_volumes, [7]);
+    assert_eq!(
+        mesh.with_order(Order::Quadratic).unwrap().left_out_volumes,
+        [7]
+    );
+}
+
 #[test]
 fn white_space_and_remarks_change_nothing() {
     let text = std::fs::read_to_string(data("box-order1-ascii.msh")).unwrap();

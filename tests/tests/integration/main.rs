@@ -19,6 +19,7 @@ mod readers;
 mod report;
 mod scenes;
 mod shape_on_gpu;
+mod shared_rows;
 mod storage;
 mod strain;
 mod tool_features;

@@ -8,7 +8,6 @@
 //! ```
 
 use contact::delassus::CouplingCompliance;
-use contact::plane::Plane;
 use device::VirtualCoupling;
 use glam::DVec3;
 use glamx::DPose3;
@@ -93,14 +92,6 @@ impl Held {
             let largest = (0..3).map(|i| compliance[i][i]).fold(0.0, f64::max);
             own > NO_COMPLIANCE * largest
         })
-    }
-
-    /// m/N along the normal of a plane.
-    pub(super) fn compliance_along(&self, plane: &Plane, reference: DVec3) -> f64 {
-        let row = plane.tool_row(reference);
-        self.compliance
-            .as_ref()
-            .map_or(0.0, |compliance| quadratic(compliance, &row))
     }
 
     /// Deviation (m, rad) of the tool under a wrench (N, N m about the grip).

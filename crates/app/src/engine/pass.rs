@@ -171,6 +171,8 @@ impl Engine {
                 .sum();
             *q = plane.gap - plane.normal.dot(*u) + along;
         }
+        let are_open = |q: &[f64]| q.iter().all(|q| *q >= 0.0);
+        let nodes_are_open = are_open(&q[..planes.len()]);
         if prune.patches().is_some() {
             prune.reduce(planes.len(), q);
         }
@@ -179,11 +181,11 @@ impl Engine {
         }
         // W: compliance of part and coupling seen along the contact normals. Not needed where all
         // gaps are open without force: then z = 0 is the exact answer.
-        let is_open = q[..m].iter().all(|q| *q >= 0.0);
+        let is_open = nodes_are_open && are_open(&q[n_rows..m]);
         if !is_open {
             let coupling = held.compliance_about(reference);
             let w = &mut w_matrix[..m * m];
-            let patches = prune.patches();
+            let patches = prune.patches_mut();
             let candidates = planes.iter().map(|plane| plane.candidate);
             let assembled = match (&mut self.constrained, &mut self.edges) {
                 (None, Some(edges)) => edges.delassus_into(pairs, part, planes, coupling, w),
@@ -263,15 +265,14 @@ impl Engine {
         (report.merge_error, report.merged_penetration) = (0.0, 0.0);
         report.merged_badly = false;
         if self.scratch.prune.patches().is_some() {
-            self.weigh_patches(reference, report);
+            self.weigh_patches(reference, is_open, report);
         }
         clock.lap(Stage::Update, report);
         change
     }
 
     /// What the rows that nodes share have cost, and better shares for the next time.
-    fn weigh_patches(&mut self, reference: DVec3, report: &mut StepReport) {
-        let stride = self.scratch.stride();
+    fn weigh_patches(&mut self, reference: DVec3, is_open: bool, report: &mut StepReport) {
         let Scratch {
             planes,
             prune,
@@ -281,11 +282,10 @@ impl Engine {
             z,
             ..
         } = &mut self.scratch;
-        let (part, constrained) = (self.part.as_ref(), self.constrained.as_deref());
         let deformed = Deformed {
-            part,
+            part: self.part.as_ref(),
             active,
-            constrained,
+            constrained: self.constrained.as_deref(),
             pairs,
         };
         let motion_of = |plane: &Plane| {
@@ -295,22 +295,7 @@ impl Engine {
             let along = row.iter().zip(&self.deviation).map(|(h, e)| h * e).sum();
             (displacement, along)
         };
-        let held = self.held;
-        let own_of = |plane: &Plane| {
-            let i = plane.candidate as usize;
-            let block = match constrained {
-                None => part.block(i, i),
-                Some(constrained) => constrained.blocks().block(i, i),
-            };
-            let own = plane.normal.dot(block * plane.normal);
-            if own > 0.0 {
-                own
-            } else {
-                // Held along the normal: the tool alone gives way.
-                held.compliance_along(plane, reference)
-            }
-        };
-        let loss = prune.learn(planes, z, motion_of, own_of, stride);
+        let loss = prune.learn(planes, z, is_open, motion_of);
         report.merged_penetration = loss.penetration;
         report.merge_error = loss.force_rel;
         report.merged_badly = loss.force_rel > self.settings.merge_tolerance;
@@ -321,7 +306,7 @@ impl Engine {
 fn assemble(
     compliance: &impl ComplianceBlocks,
     planes: &[Plane],
-    patches: Option<&Patches>,
+    patches: Option<&mut Patches>,
     coupling: Option<CouplingCompliance>,
     w: &mut [f64],
 ) -> Result<(), contact::Error> {

@@ -1,14 +1,15 @@
-//! More near nodes than rows: patches of neighbours share a row each, and learn from step to step how.
+//! More near nodes than rows: patches of neighbours share a row each, and learn how.
 //!
-//! The shares in which a patch's nodes carry its force are those of the step before, corrected by the gaps that it
-//! left (one step of Jacobi's method, projected to pushes):
+//! The shares in which a patch's nodes carry its force are corrected by the gaps that they leave (one step of Jacobi's
+//! method in what the patches cannot do, projected to pushes):
 //!
 //! ```text
-//! ẑ_i = max(0, z_i - α r_i / n_iᵀ C_ii n_i)        r = q + W z
+//! ẑ_i = max(0, z_i - α r_i / s_i)     r = q + W z     s_i = (e_i - p)ᵀ W (e_i - p) / (1 - p_i)
 //! ```
-//! Each node alone changes its own gap most, so that within a patch, whose mean gap the contact problem closes, this
-//! converges: a tool at rest is felt as without patches after some steps. A node that comes near has no share yet,
-//! and patches that change hands change nothing where shares are right: the force stays continuous.
+//! The contact problem closes a patch's mean gap; s_i is what a node gives way beyond that, which on a slender arm is far
+//! less than its own compliance. A step begins with the shares of the step before, and goes on in rounds, each with
+//! better shares, until the estimated error is small: a tool that moves is felt as one at rest. A node that comes near
+//! has no share yet, and patches that change hands change nothing where shares are right: the force stays continuous.
 
 use contact::patch::{Loss, Patches, loss};
 use contact::plane::Plane;
@@ -20,6 +21,12 @@ use super::clusters::Clusters;
 /// α: neighbours add to what a node's own force does, so that a full step would overshoot.
 const DAMPING: f64 = 0.7;
 
+/// Rounds for better shares in one search for equilibrium, each with some passes.
+pub(super) const MOST_ROUNDS: u32 = 8;
+
+/// Of the tolerance of the resultant, the estimate above which shares are made better.
+pub(super) const GOOD_ENOUGH: f64 = 0.5;
+
 /// Patches of the near nodes where they do not fit the rows, and all memory for them.
 #[derive(Debug)]
 pub(super) struct Prune {
@@ -29,11 +36,13 @@ pub(super) struct Prune {
     q: Vec<f64>,
     /// Gaps of the planes after the solution, m.
     gaps: Vec<f64>,
-    /// By candidate: force that it will carry about, N, in this stride; zero but for those in `hinted`.
+    /// Number of the search for shares, from 1.
+    round: u64,
+    /// By candidate: force that it will carry about, N, in this round; zero but for those in `hinted`.
     hints: Vec<f64>,
     hinted: Vec<u32>,
     hinted_in: u64,
-    /// By plane of the last pass with patches: better forces, N, and the stride that they were found in.
+    /// By plane of the last pass with patches: better forces, N, and the round that they were found in.
     better: Vec<f64>,
     better_of: Vec<u32>,
     better_in: u64,
@@ -46,6 +55,7 @@ impl Prune {
             is_on: false,
             q: Vec::with_capacity(max_near),
             gaps: Vec::with_capacity(max_near),
+            round: 0,
             hints: vec![0.0; n_candidates],
             hinted: Vec::with_capacity(n_candidates),
             hinted_in: 0,
@@ -60,13 +70,23 @@ impl Prune {
         (self.hinted_in, self.better_in) = (0, 0);
     }
 
+    /// From here on patches take the better shares that the passes until now have found.
+    pub(super) fn begin_round(&mut self) {
+        self.round += 1;
+    }
+
+    /// The patches of this pass, if there are any, for its Delassus operator.
+    pub(super) fn patches_mut(&mut self) -> Option<&mut Patches> {
+        self.is_on.then_some(&mut self.patches)
+    }
+
     /// The patches of this pass, if there are any.
     pub(super) fn patches(&self) -> Option<&Patches> {
         self.is_on.then_some(&self.patches)
     }
 
-    /// Sorts the planes into patches where they are more than `max_rows`; the number of rows. `stride`: number of the
-    /// search for equilibrium, from 1. `length` (m): what a turn of a normal by one radian is compared with.
+    /// Sorts the planes into patches where they are more than `max_rows`; the number of rows. `length` (m): what a turn
+    /// of a normal by one radian is compared with.
     pub(super) fn gather(
         &mut self,
         planes: &mut [Plane],
@@ -74,17 +94,16 @@ impl Prune {
         active: &[ActiveContact],
         clusters: &Clusters,
         length: f64,
-        stride: u64,
     ) -> usize {
         self.is_on = planes.len() > max_rows;
         if !self.is_on {
             return planes.len();
         }
         // Shares stay as they are until the planes stand still.
-        let is_begun = self.hinted_in == stride;
+        let is_begun = self.hinted_in == self.round;
         if !is_begun {
-            self.hinted_in = stride;
-            self.hint(active, stride);
+            self.hinted_in = self.round;
+            self.hint(active);
         }
         self.patches.gather(
             planes,
@@ -98,11 +117,11 @@ impl Prune {
         self.patches.len()
     }
 
-    fn hint(&mut self, active: &[ActiveContact], stride: u64) {
+    fn hint(&mut self, active: &[ActiveContact]) {
         for candidate in self.hinted.drain(..) {
             self.hints[candidate as usize] = 0.0;
         }
-        if self.better_in != 0 && self.better_in + 1 == stride {
+        if self.better_in != 0 && self.better_in + 1 == self.round {
             for (candidate, force) in self.better_of.iter().zip(&self.better) {
                 self.hints[*candidate as usize] = *force;
                 self.hinted.push(*candidate);
@@ -123,29 +142,29 @@ impl Prune {
         self.patches.reduce_into(&self.q, q);
     }
 
-    /// What the solution lost, and better shares for the next stride. `z`: forces of the planes, N; `motion_of`: the
-    /// displacement of a plane's node and how far the tool comes towards it, m; `own_of`: how far a unit force moves
-    /// its own node, m/N.
+    /// What the solution lost, and better shares for the next round. `z`: forces of the planes, N; `motion_of`: the
+    /// displacement of a plane's node and how far the tool comes towards it, m; `is_open`: no gap was closed without
+    /// force, so that there is none.
     pub(super) fn learn(
         &mut self,
         planes: &[Plane],
         z: &[f64],
+        is_open: bool,
         motion_of: impl Fn(&Plane) -> (DVec3, f64),
-        own_of: impl Fn(&Plane) -> f64,
-        stride: u64,
     ) -> Loss {
         self.gaps.clear();
         self.better.clear();
         self.better_of.clear();
-        for ((plane, z), q) in planes.iter().zip(z).zip(&self.q) {
+        for (i, ((plane, z), q)) in planes.iter().zip(z).zip(&self.q).enumerate() {
             let (displacement, tool) = motion_of(plane);
             let gap = q + plane.normal.dot(displacement) - tool;
-            let better = (z - DAMPING * gap / own_of(plane)).max(0.0);
             self.gaps.push(gap);
-            self.better.push(better);
+            let shift = if is_open { None } else { self.patches.shift(i) };
+            let better = shift.map_or(*z, |shift| z - DAMPING * gap / shift);
+            self.better.push(better.max(0.0));
             self.better_of.push(plane.candidate);
         }
-        self.better_in = stride;
+        self.better_in = self.round;
         loss(&z[..planes.len()], &self.better, &self.q, &self.gaps)
     }
 }

@@ -105,20 +105,13 @@ impl Scratch {
 
     /// Rows of the contact problem of these planes, which are put in the order of their patches where they share rows.
     pub(super) fn gather(&mut self, clusters: &Clusters, length: f64) -> usize {
-        let (active, stride) = (&self.active, self.stride);
         self.prune.gather(
             &mut self.planes,
             self.max_rows,
-            active,
+            &self.active,
             clusters,
             length,
-            stride,
         )
-    }
-
-    /// Number of the search for equilibrium, from 1.
-    pub(super) fn stride(&self) -> u64 {
-        self.stride
     }
 
     /// Sets the contacts aside.
@@ -153,6 +146,7 @@ impl Scratch {
     /// Begins a search for equilibrium: only nodes that carry force have had a plane.
     pub(super) fn begin_stride(&mut self) {
         self.stride += 1;
+        self.prune.begin_round();
         self.seen.clear();
         for contact in &self.active[..self.n_own] {
             self.stride_of[contact.candidate as usize] = self.stride;

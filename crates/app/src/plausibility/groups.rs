@@ -1,4 +1,4 @@
-//! One name for two groups of the mesh.
+//! Groups of the mesh: one name for two, and volumes in none.
 
 use super::warning;
 use crate::prepare::LoadedPart;
@@ -23,6 +23,26 @@ pub(super) fn same_name(loaded: &LoadedPart) -> Option<Warning> {
     })
 }
 
+/// Volumes of the model that the mesh file names but holds no elements of.
+pub(super) fn left_out(loaded: &LoadedPart) -> Option<Warning> {
+    let volumes = &loaded.mesh.left_out_volumes;
+    let tags: Vec<String> = volumes.iter().map(i32::to_string).collect();
+    let what = match tags.len() {
+        0 => return None,
+        1 => format!("volume {} of the model is", tags[0]),
+        _ => format!("volumes {} of the model are", tags.join(", ")),
+    };
+    Some(warning(
+        "volumes-left-out",
+        volumes.len() as f64,
+        format!(
+            "{}: {what} in no physical group, so that Gmsh saved no elements of it, and the part is computed without; \
+             if it belongs to the part, put it into a physical volume and mesh the model again",
+            loaded.spec.mesh_path.display()
+        ),
+    ))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -39,5 +59,16 @@ mod tests {
         let told = same_name(&loaded).unwrap();
         assert_eq!(told.number, Some(2.0));
         assert!(told.text.contains("clip.toml:17"), "{}", told.text);
+    }
+
+    #[test]
+    fn volumes_that_the_file_left_out_are_told() {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
+        let scene = Scene::load(&folder.join("clip.toml")).unwrap();
+        let mut loaded = prepare::load(&setup::part_spec(&scene).unwrap()).unwrap();
+        assert_eq!(left_out(&loaded), None);
+        loaded.mesh.left_out_volumes = vec![2, 5];
+        let told = left_out(&loaded).unwrap();
+        assert!(told.text.contains("volumes 2, 5") && told.text.contains("clip.msh"));
     }
 }

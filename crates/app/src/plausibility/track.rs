@@ -1,5 +1,6 @@
 //! A run as the checks look at it: one line per period, plain numbers along the approach.
 
+use crate::report::part_curve::main_peak;
 use crate::scene::{Hand, Scene};
 use crate::session::Recording;
 
@@ -21,7 +22,7 @@ pub(super) struct Track {
     pub(super) samples: Vec<Sample>,
     /// Of the samples, those of the approach; the others hold.
     pub(super) n_approach: usize,
-    /// N, largest of the approach; 0 where nothing resists.
+    /// N, largest of the approach, or that of the snap where the part is driven; 0 where nothing resists.
     pub(super) peak_force: f64,
     /// Where it is.
     pub(super) peak: Option<usize>,
@@ -38,7 +39,11 @@ impl Track {
     pub(super) fn of_drive(scene: &Scene, driven: &Recording) -> Self {
         let (samples, n_approach) = samples(driven);
         let drive = &scene.drive;
-        Self::new(samples, n_approach, drive.travel, drive.step, f64::INFINITY)
+        let mut track = Self::new(samples, n_approach, drive.travel, drive.step, f64::INFINITY);
+        if let Some(main) = main_peak(&track.forces()) {
+            (track.peak, track.peak_force) = (Some(main), track.samples[main].force);
+        }
+        track
     }
 
     /// Of what a hand felt.
@@ -55,12 +60,9 @@ impl Track {
         per_period: f64,
         grip: f64,
     ) -> Self {
-        let mut peak: Option<usize> = None;
-        for (i, sample) in samples[..n_approach].iter().enumerate() {
-            if sample.force > peak.map_or(0.0, |p| samples[p].force) {
-                peak = Some(i);
-            }
-        }
+        let by_force = |a: &usize, b: &usize| samples[*a].force.total_cmp(&samples[*b].force);
+        let largest = (0..n_approach).rev().max_by(by_force);
+        let peak = largest.filter(|&p| samples[p].force > 0.0);
         Self {
             peak_force: peak.map_or(0.0, |p| samples[p].force),
             peak,
@@ -70,6 +72,12 @@ impl Track {
             per_period,
             grip,
         }
+    }
+
+    /// N, of the approach.
+    fn forces(&self) -> Vec<f64> {
+        let approach = self.samples[..self.n_approach].iter();
+        approach.map(|sample| sample.force).collect()
     }
 }
 

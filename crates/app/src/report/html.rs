@@ -72,7 +72,7 @@ pub fn page(run: &Run, curve: &Curve, drawings: &Drawings) -> String {
     }
     settings::settings(&mut page, run);
     settings::notes(&mut page, run);
-    reading::how_to_read(&mut page);
+    reading::how_to_read(&mut page, run);
     head::close(&mut page, &run.machine);
     page
 }

@@ -144,12 +144,11 @@ impl PartCurve {
             .map(|p| p.place())
             .filter(|p| p.force_n > ROUND_OFF_SHARE * scale)
             .max_by(|a, b| a.force_n.total_cmp(&b.force_n));
-        let by_peak = |a: &usize, b: &usize| humps[*a].force_n.total_cmp(&humps[*b].force_n);
         Self {
             n_steps: rows.len(),
             n_in: way_in.len(),
             is_touched: rows.iter().any(|row| row.contacts > 0),
-            snap_idx: (0..humps.len()).rev().max_by(by_peak),
+            snap_idx: humps::main_of(&humps),
             seat,
             largest,
             end: way_in.last().map(|p| p.place()).unwrap_or_default(),
@@ -179,6 +178,21 @@ impl PartCurve {
     pub fn insertion(&self) -> Option<Place> {
         self.snap().map(Hump::peak).or(self.largest)
     }
+}
+
+/// Position of the main hump's peak among forces (N) on a way in that only goes on; `None` where none is passed.
+pub(crate) fn main_peak(forces: &[f64]) -> Option<usize> {
+    let finite = forces.iter().enumerate().filter(|(_, f)| f.is_finite());
+    let points: Vec<Point> = finite
+        .map(|(row_idx, &force)| Point {
+            row_idx,
+            travel: row_idx as f64,
+            force,
+        })
+        .collect();
+    let scale = points.iter().map(|p| p.force.abs()).fold(0.0, f64::max);
+    let humps = humps::of(&points, scale);
+    humps::main_of(&humps).map(|idx| humps[idx].row_idx)
 }
 
 /// A row on the way in.

@@ -3,22 +3,23 @@
 //! The doc comments of the fields here are the text of `docs/scene.md` and of the JSON Schema.
 //! `x-quantity` names a row of the unit table; defaults are in SI whatever the file's units.
 
-use std::fmt;
 use std::path::Path;
 
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::de::value::MapAccessDeserializer;
-use serde::de::{self, Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+use serde::de::{self, Deserialize, Deserializer};
 
 mod accuracy;
+mod groups;
 mod handbook;
+mod words;
 
-use super::error::{SceneError, line_of, plain, suggestion};
+use super::error::SceneError;
 use super::{DeviceModel, Guide, Handle, QuadratureRule, Start, StrainUse, Units};
 pub(super) use accuracy::{
     AccuracyKeys, AccuracyRaw, AdaptiveKeys, AdaptiveRaw, IterationsRaw, MethodRaw, MultiplyRaw,
     MultiplyScalarRaw, PresetRaw, RatesRaw, ScalarRaw, ToolFeaturesRaw,
 };
+pub(super) use groups::{FixedRaw, NamesRaw};
 pub(super) use handbook::{HandbookRaw, KindRaw};
 
 /// Values of keys that are not written.
@@ -202,177 +203,6 @@ pub(super) struct MaterialRaw {
     /// Largest strain that the material bears once, such as 0.02; the report compares with it.
     #[schemars(extend("x-quantity" = "number"))]
     pub(super) permissible_strain: Option<At<f64>>,
-}
-
-/// What is held: one group or several.
-#[derive(Debug)]
-pub(super) struct FixedRaw(pub(super) Vec<At<FixedEntry>>);
-
-/// One held group.
-#[derive(Debug)]
-pub(super) struct FixedEntry {
-    pub(super) group: String,
-    /// `None`: all.
-    pub(super) components: Option<At<Vec<At<Component>>>>,
-}
-
-/// A direction of the part's frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub(super) enum Component {
-    X,
-    Y,
-    Z,
-}
-
-impl<'de> Deserialize<'de> for FixedEntry {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        #[derive(serde::Deserialize)]
-        #[serde(deny_unknown_fields)]
-        struct Table {
-            group: String,
-            components: Option<At<Vec<At<Component>>>>,
-        }
-        struct Entry;
-        impl<'de> Visitor<'de> for Entry {
-            type Value = FixedEntry;
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a group name or a table with `group` and `components`")
-            }
-            fn visit_str<E: de::Error>(self, name: &str) -> Result<FixedEntry, E> {
-                Ok(FixedEntry {
-                    group: name.to_owned(),
-                    components: None,
-                })
-            }
-            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<FixedEntry, A::Error> {
-                let table = Table::deserialize(MapAccessDeserializer::new(map))?;
-                Ok(FixedEntry {
-                    group: table.group,
-                    components: table.components,
-                })
-            }
-        }
-        deserializer.deserialize_any(Entry)
-    }
-}
-
-impl<'de> Deserialize<'de> for FixedRaw {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Entries;
-        impl<'de> Visitor<'de> for Entries {
-            type Value = FixedRaw;
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a group name, or a list of group names and of tables with `group`")
-            }
-            fn visit_str<E: de::Error>(self, name: &str) -> Result<FixedRaw, E> {
-                let entry = FixedEntry {
-                    group: name.to_owned(),
-                    components: None,
-                };
-                // The offset of the whole value is known outside; see `validate`.
-                Ok(FixedRaw(vec![At {
-                    value: entry,
-                    offset: 0,
-                }]))
-            }
-            fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<FixedRaw, A::Error> {
-                let mut entries = Vec::new();
-                while let Some(entry) = seq.next_element()? {
-                    entries.push(entry);
-                }
-                Ok(FixedRaw(entries))
-            }
-        }
-        deserializer.deserialize_any(Entries)
-    }
-}
-
-impl JsonSchema for FixedRaw {
-    fn inline_schema() -> bool {
-        true
-    }
-    fn schema_name() -> std::borrow::Cow<'static, str> {
-        "Fixed".into()
-    }
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({
-            "x-type": "name or list",
-            "anyOf": [
-                { "type": "string" },
-                {
-                    "type": "array",
-                    "minItems": 1,
-                    "items": {
-                        "anyOf": [
-                            { "type": "string" },
-                            {
-                                "type": "object",
-                                "properties": {
-                                    "group": { "type": "string" },
-                                    "components": {
-                                        "type": "array",
-                                        "minItems": 1,
-                                        "items": { "type": "string", "enum": ["x", "y", "z"] }
-                                    }
-                                },
-                                "required": ["group"],
-                                "additionalProperties": false
-                            }
-                        ]
-                    }
-                }
-            ]
-        })
-    }
-}
-
-/// One name or several.
-#[derive(Debug)]
-pub(super) struct NamesRaw(pub(super) Vec<At<String>>);
-
-impl<'de> Deserialize<'de> for NamesRaw {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Names;
-        impl<'de> Visitor<'de> for Names {
-            type Value = NamesRaw;
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a group name or a list of group names")
-            }
-            fn visit_str<E: de::Error>(self, name: &str) -> Result<NamesRaw, E> {
-                Ok(NamesRaw(vec![At {
-                    value: name.to_owned(),
-                    offset: 0,
-                }]))
-            }
-            fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<NamesRaw, A::Error> {
-                let mut names = Vec::new();
-                while let Some(name) = seq.next_element()? {
-                    names.push(name);
-                }
-                Ok(NamesRaw(names))
-            }
-        }
-        deserializer.deserialize_any(Names)
-    }
-}
-
-impl JsonSchema for NamesRaw {
-    fn inline_schema() -> bool {
-        true
-    }
-    fn schema_name() -> std::borrow::Cow<'static, str> {
-        "Names".into()
-    }
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({
-            "x-type": "name or list",
-            "anyOf": [
-                { "type": "string" },
-                { "type": "array", "minItems": 1, "items": { "type": "string" } }
-            ]
-        })
-    }
 }
 
 /// Shape of the tool.
@@ -621,138 +451,5 @@ pub(super) struct OutputRaw {
 
 /// Reads the text; what does not fit the keys above is an error with its line.
 pub(super) fn parse(source: &str, path: &Path) -> Result<SceneRaw, SceneError> {
-    toml::from_str(source).map_err(|error| translate(&error, source, path))
-}
-
-/// The TOML reader's error in our words. Its messages are serde's, which name the wrong word and
-/// the right ones in backticks.
-fn translate(error: &toml::de::Error, source: &str, path: &Path) -> SceneError {
-    let offset = error.span().map_or(0, |span| span.start);
-    let line = line_of(source, offset);
-    let path = path.to_path_buf();
-    let message = error.message();
-    // The name is the file's and may hold backticks itself; the known ones behind it do not.
-    let (head, tail) = message.rsplit_once(", expected ").unwrap_or((message, ""));
-    let first = head.split_once('`').map_or("", |(_, name)| name);
-    let first = plain(first.strip_suffix('`').unwrap_or(first));
-    let known: Vec<&str> = tail.split('`').skip(1).step_by(2).collect();
-    if message.starts_with("unknown field") {
-        let mend = suggestion(&first, &known);
-        SceneError::UnknownKey {
-            path,
-            line,
-            key: first,
-            mend,
-        }
-    } else if message.starts_with("unknown variant") {
-        let (key, mend) = (key_before(source, offset), suggestion(&first, &known));
-        SceneError::UnknownWord {
-            path,
-            line,
-            key,
-            word: first,
-            mend,
-        }
-    } else if message.starts_with("missing field") {
-        let (what, mend) = if super::schema::REQUIRED_SECTIONS.contains(&first.as_str()) {
-            (
-                format!("section [{first}] is missing"),
-                "docs/scene.md has an example".to_owned(),
-            )
-        } else {
-            let section = section_at(source, offset);
-            (
-                format!("key `{first}` is missing{section}"),
-                format!("add `{first} = ...`"),
-            )
-        };
-        SceneError::Missing {
-            path,
-            line,
-            what,
-            mend,
-        }
-    } else if message.starts_with("invalid type") || message.starts_with("invalid length") {
-        SceneError::Type {
-            path,
-            line,
-            key: key_before(source, offset),
-            what: in_words(&one_line(message)),
-        }
-    } else if message == "wanted string or table" {
-        // What the reader says of a choice that is not a word.
-        SceneError::Type {
-            path,
-            line,
-            key: key_before(source, offset),
-            what: "not a word; write one in quotes".to_owned(),
-        }
-    } else {
-        SceneError::Syntax {
-            path,
-            line,
-            what: one_line(message),
-        }
-    }
-}
-
-/// Serde's names of types in those of the document.
-fn in_words(message: &str) -> String {
-    let (found, expected) = message.rsplit_once(", expected ").unwrap_or((message, ""));
-    let expected = match expected {
-        "" => return message.to_owned(),
-        "f64" => "a number",
-        "i64" => "a whole number that fits 64 bits",
-        section if section.starts_with("struct ") => "a section",
-        other => other,
-    };
-    let found = found.strip_suffix(" as i128").unwrap_or(found);
-    let found = match found {
-        "invalid type: map" => "invalid type: table",
-        other => other,
-    };
-    format!("{found}, expected {expected}")
-}
-
-fn one_line(message: &str) -> String {
-    let lines: Vec<&str> = message
-        .lines()
-        .map(str::trim)
-        .filter(|line| !line.is_empty())
-        .collect();
-    plain(&lines.join("; "))
-}
-
-/// Name of the key whose value stands at an offset, for messages: the last `name =` before it.
-fn key_before(source: &str, offset: usize) -> String {
-    let before = source.get(..offset).unwrap_or_default();
-    let key = before
-        .rfind('=')
-        .map_or("", |equals| before[..equals].trim_end());
-    let start = key.rfind(|c: char| !(c.is_alphanumeric() || "_-.".contains(c)));
-    let start = start.map_or(0, |at| {
-        at + key[at..].chars().next().map_or(0, char::len_utf8)
-    });
-    match &key[start..] {
-        "" => "value".to_owned(),
-        name => name.to_owned(),
-    }
-}
-
-/// ` in [section]` if the offset is at or below a section's header.
-fn section_at(source: &str, offset: usize) -> String {
-    let end = source
-        .get(offset..)
-        .and_then(|rest| rest.find('\n'))
-        .map_or(source.len(), |length| offset + length);
-    let before = source.get(..end).unwrap_or_default();
-    let header = before
-        .lines()
-        .rev()
-        .map(str::trim)
-        .find(|line| line.starts_with('['));
-    match header.and_then(|line| line.split(']').next()) {
-        Some(header) => format!(" in {header}]"),
-        None => String::new(),
-    }
+    toml::from_str(source).map_err(|error| words::translate(&error, source, path))
 }

@@ -11,7 +11,7 @@ mod reader;
 mod version2;
 mod version4;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use super::Mesh;
@@ -120,6 +120,8 @@ struct File {
     names: HashMap<(i32, i32), String>,
     /// Physical tags of an entity (dimension, tag).
     physical: HashMap<(i32, i32), Vec<i32>>,
+    /// Entities whose elements stand with those that a partitioned file made of them.
+    split: HashSet<(i32, i32)>,
     node_tags: Vec<u64>,
     nodes: Vec<[f64; 3]>,
     blocks: Vec<Block>,

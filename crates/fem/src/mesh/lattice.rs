@@ -162,6 +162,7 @@ impl<'a> Lattice<'a> {
             groups,
         );
         mesh.shared_names.clone_from(&self.old.shared_names);
+        mesh.left_out_volumes.clone_from(&self.old.left_out_volumes);
         Ok(mesh)
     }
 

@@ -77,7 +77,7 @@ pub(super) fn cards(page: &mut String, run: &Run, curve: &Curve) {
             curve.retention_force_n.map_or("not pulled".into(), newtons),
         ),
     };
-    let mut cards = vec![
+    let cards = [
         (verdict.to_owned(), "verdict"),
         (newtons(peak), "peak insertion force"),
         (format!("{} mm", short(travel * 1e3)), "travel at the peak"),
@@ -94,10 +94,14 @@ pub(super) fn cards(page: &mut String, run: &Run, curve: &Curve) {
             "permissible over largest strain",
         ),
     ];
+    let cards = cards.map(|(value, label)| (value, label.to_owned()));
     let limits = run.driven.iter().flat_map(|driven| &driven.limits);
-    cards.extend(limits.map(|limit| (limit.state.name().to_owned(), limit.key)));
+    let limits = limits.map(|limit| {
+        let label = format!("limit: {}", limit.key.replace('_', " "));
+        (limit.state.name().to_owned(), label)
+    });
     page.push_str("<div class=\"cards\">");
-    for (value, label) in cards {
+    for (value, label) in cards.into_iter().chain(limits) {
         let _ = write!(
             page,
             "<div class=\"card\"><b>{}</b><span>{label}</span></div>",

@@ -54,6 +54,21 @@ pub(super) fn key_numbers(page: &mut String, run: &Run, curve: &Curve) {
         ),
     ];
     let mut rows: Vec<_> = rows.into_iter().map(|(l, v)| (l.to_owned(), v)).collect();
+    if let Some(driven) = &run.driven {
+        let worst = driven
+            .rows
+            .iter()
+            .map(|row| row.certificate)
+            .fold(0.0, f64::max);
+        rows.push((
+            "places of the part's own curve".to_owned(),
+            driven.rows.len().to_string(),
+        ));
+        rows.push((
+            "worst certificate of these".to_owned(),
+            format!("{worst:.1e}"),
+        ));
+    }
     if !run.rows.is_empty() {
         rows.extend(felt(run, curve));
     }

@@ -61,6 +61,12 @@ pub(super) fn of(points: &[Point], scale: f64) -> Vec<Hump> {
         .collect()
 }
 
+/// Which is the main one: the largest, and the first of equals.
+pub(super) fn main_of(humps: &[Hump]) -> Option<usize> {
+    let by_peak = |a: &usize, b: &usize| humps[*a].force_n.total_cmp(&humps[*b].force_n);
+    (0..humps.len()).rev().max_by(by_peak)
+}
+
 /// Positions of the peaks that the force rises to, and falls from, by [`HUMP_SHARE`] of them and by `least`.
 fn peaks(points: &[Point], least: f64) -> Vec<usize> {
     let mut found = Vec::new();

@@ -104,13 +104,19 @@ pub fn curves(run: &Run) -> Vec<Series> {
             .filter(|r| (r.phase == Phase::Retract) == is_out);
         rows.map(|row| (row.travel_m, row.force_n)).collect()
     };
-    add("pushing in", driven(false), Look::In);
-    add("pulling out", driven(true), Look::Out);
     let (felt_in, felt_out) = if run.driven.is_some() {
         (Look::OtherIn, Look::OtherOut)
     } else {
         (Look::In, Look::Out)
     };
+    // Beside what a hand felt it is told whose curve this is.
+    let (into, out) = if run.rows.is_empty() {
+        ("pushing in", "pulling out")
+    } else {
+        ("driven in", "driven out")
+    };
+    add(into, driven(false), Look::In);
+    add(out, driven(true), Look::Out);
     add("felt by the hand", felt(false), felt_in);
     add("felt, pulling out", felt(true), felt_out);
     all.extend(run.handbook.as_ref().and_then(of_handbook));
@@ -307,8 +313,9 @@ mod tests {
             "(mm)",
             "(N)",
             "peak 42 N at 2 mm",
-            "pushing in",
-            "pulling out",
+            "driven in",
+            "driven out",
+            "felt by the hand",
             "handbook: cantilever",
         ] {
             assert!(svg.contains(text), "{text}");
@@ -327,6 +334,15 @@ mod tests {
         run.handbook.as_mut().unwrap().name = "long ".repeat(40);
         let svg = of_run(&run);
         assert!(svg.contains("long …\n"));
+    }
+
+    #[test]
+    fn without_a_hand_the_legend_has_one_way_in_and_one_out() {
+        let mut run = sample::run();
+        run.rows.clear();
+        let svg = of_run(&run);
+        assert!(svg.contains("pushing in") && svg.contains("pulling out"));
+        assert!(!svg.contains("driven in") && !svg.contains("felt"));
     }
 
     #[test]

@@ -195,7 +195,7 @@ const HEAD: &str = "<tr><th>setting</th><th>step, 50 % (µs)</th><th>step, 99.9 
 const HOW_TO_READ: &str = "<ul>\
 <li><b>wrench</b>: distance of force and torque from the reference along the whole path, root of the \
 mean square, as a share of the reference's. <b>solver</b>: the same against the exact solution on the \
-same mesh. <b>peak</b>: of the force at which it snaps (the first peak that the force falls from, not what \
+same mesh. <b>peak</b>: of the force at which it snaps (the largest peak that is passed, not what \
 it meets at the end), with its sign; of the largest force where nothing snaps; a dash where only one of setting and \
 reference snaps. \
 <b>shape</b>: of the drawn displacement where the part can touch; a dash where the mesh has other \

@@ -1,10 +1,6 @@
-//! Where a part snaps on a path: the first hump of the force, not what it meets at the end.
+//! Where a part snaps on a path: as in the verdict of a run, not what it meets at the end.
 
-/// Share of a peak that the force must fall by before it rises above it again: less is a step from node to node.
-const FALL: f64 = 0.05;
-
-/// A hump below this share of the highest one is a touch on the way, not the snap.
-const LEAST_SHARE: f64 = 0.05;
+use crate::report::part_curve::main_peak;
 
 /// The peak of a path.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -17,57 +13,17 @@ pub(super) struct Peak {
     pub(super) is_snap: bool,
 }
 
-/// The first peak that the force falls from by [`FALL`] of it; the largest force if there is none. Touches on the way
-/// are passed over. A seat at the end of the path, however high, has no fall after it.
+/// The peak of the main hump; the largest force if there is none.
 pub(super) fn snap(forces: impl Iterator<Item = f64>) -> Peak {
     let forces: Vec<f64> = forces.collect();
-    let humps = humps(&forces);
-    let highest = humps.iter().map(|peak| peak.force).fold(0.0, f64::max);
-    let first = humps
-        .into_iter()
-        .find(|peak| peak.force >= LEAST_SHARE * highest);
-    first.unwrap_or_else(|| {
-        let largest = (0..forces.len()).max_by(|a, b| forces[*a].total_cmp(&forces[*b]));
-        Peak {
-            force: largest.map_or(0.0, |at| forces[at]),
-            at: largest.unwrap_or(0),
-            is_snap: false,
-        }
-    })
-}
-
-/// Peaks that the force falls from, in order.
-fn humps(forces: &[f64]) -> Vec<Peak> {
-    let mut found = Vec::new();
-    // The highest since the last hump's valley, and the lowest since that peak.
-    let (mut top, mut valley) = (None::<usize>, None::<f64>);
-    for (at, &force) in forces.iter().enumerate() {
-        if let Some(lowest) = valley {
-            // Down from a hump: a new one begins once the force rises by as much as counts as a fall.
-            valley = Some(lowest.min(force));
-            let last: &Peak = match found.last() {
-                Some(last) => last,
-                None => continue,
-            };
-            if force - lowest.min(force) > FALL * last.force {
-                (top, valley) = ((force > 0.0).then_some(at), None);
-            }
-            continue;
-        }
-        if top.is_none_or(|peak| force > forces[peak]) {
-            top = if force > 0.0 { Some(at) } else { top };
-        } else if let Some(peak) = top
-            && force < (1.0 - FALL) * forces[peak]
-        {
-            found.push(Peak {
-                force: forces[peak],
-                at: peak,
-                is_snap: true,
-            });
-            (top, valley) = (None, Some(force));
-        }
+    let main = main_peak(&forces);
+    let largest = || (0..forces.len()).max_by(|a, b| forces[*a].total_cmp(&forces[*b]));
+    let at = main.or_else(largest);
+    Peak {
+        force: at.map_or(0.0, |at| forces[at]),
+        at: at.unwrap_or(0),
+        is_snap: main.is_some(),
     }
-    found
 }
 
 #[cfg(test)]
@@ -92,8 +48,8 @@ mod tests {
     }
 
     #[test]
-    fn of_several_humps_the_first_is_the_peak() {
-        assert_eq!(of(&[0.0, 3.0, 1.0, 7.0, 2.0, 9.0]), (3.0, 1, true));
+    fn of_several_humps_the_largest_is_the_peak() {
+        assert_eq!(of(&[0.0, 3.0, 1.0, 7.0, 2.0, 9.0]), (7.0, 3, true));
         assert_eq!(of(&[0.0, 7.0, 5.0, 3.0, 4.0, 1.0]), (7.0, 1, true));
     }
 

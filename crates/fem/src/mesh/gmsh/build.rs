@@ -30,6 +30,7 @@ impl File {
             self.add(block, order, &node_of_tag, &mut elements, &mut groups)?;
         }
         let (groups, shared_names) = one_group_for_each_name(groups);
+        let left_out_volumes = self.volumes_without_elements();
         let mut mesh = Mesh::new(
             order,
             self.nodes,
@@ -39,7 +40,31 @@ impl File {
             groups,
         );
         mesh.shared_names = shared_names;
+        mesh.left_out_volumes = left_out_volumes;
         Ok(mesh)
+    }
+
+    /// Volumes in no group of which there is no element, ascending.
+    fn volumes_without_elements(&self) -> Vec<i32> {
+        let of_block = |block: &Block| match block.groups {
+            GroupsOf::Entity(dimension, tag) if !block.tags.is_empty() => Some((dimension, tag)),
+            _ => None,
+        };
+        let filled: HashSet<_> = self.blocks.iter().filter_map(of_block).collect();
+        let mut volumes = self.loose_volumes();
+        volumes.retain(|tag| !filled.contains(&(3, *tag)) && !self.split.contains(&(3, *tag)));
+        volumes
+    }
+
+    /// Volumes in no group, ascending.
+    fn loose_volumes(&self) -> Vec<i32> {
+        let is_loose = |((dimension, _), groups): &(&(i32, i32), &Vec<i32>)| {
+            *dimension == 3 && groups.is_empty()
+        };
+        let loose = self.physical.iter().filter(is_loose);
+        let mut tags: Vec<i32> = loose.map(|((_, tag), _)| *tag).collect();
+        tags.sort_unstable();
+        tags
     }
 
     fn node_of_tag(&self) -> Result<HashMap<u64, u32>, Error> {
@@ -142,15 +167,7 @@ impl File {
     /// Why there are no solids at all.
     fn no_solid(&self) -> Error {
         let is_volume = |(dimension, _): &(i32, i32)| *dimension == 3;
-        let in_group =
-            |volume: &(i32, i32)| self.physical.get(volume).is_some_and(|p| !p.is_empty());
-        let mut loose: Vec<i32> = self
-            .physical
-            .keys()
-            .filter(|entity| is_volume(entity) && !in_group(entity))
-            .map(|(_, tag)| *tag)
-            .collect();
-        loose.sort_unstable();
+        let loose = self.loose_volumes();
         let has_groups = self.physical.values().any(|p| !p.is_empty());
         let has_solid_group = self.names.keys().any(is_volume);
         let tags = || {

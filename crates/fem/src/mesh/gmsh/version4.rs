@@ -52,6 +52,7 @@ impl File {
                     physical = self.physical.get(&parent).cloned().unwrap_or_default();
                 }
                 self.physical.insert((dimension, tag), physical);
+                self.split.insert(parent);
             }
         }
         Ok(())

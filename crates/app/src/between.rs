@@ -29,6 +29,9 @@ const TOLD_DEPTH: f64 = 0.02;
 /// four times what it should be.
 const NODES_IN_RADIUS: f64 = 4.0;
 
+/// Distances of nodes in a radius of the tool below which it is taken for the bend between two facets.
+const FACET: f64 = 0.2;
+
 /// A place where a tool is at a face.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
@@ -87,15 +90,22 @@ impl Between {
     }
 
     /// Words for a warning, if the tool is too fine for the mesh. `travel` (m): of the whole run. `has_edges`: whether
-    /// sharp edges are felt in faces; then only what is smooth can be missed, which the depth shows.
-    pub fn warning(&self, travel: f64, has_edges: bool) -> Option<String> {
+    /// sharp edges are felt in faces; then only what is smooth can be missed, which the depth shows. `has_facets`: whether
+    /// the tool is a mesh, of which a round is as many slopes.
+    pub fn warning(&self, travel: f64, has_edges: bool, has_facets: bool) -> Option<String> {
         let is_deep = |p: &Place| p.depth > TOLD_DEPTH * travel && p.depth > AT_FACE * p.spacing;
         let is_fine = |p: &Place| !has_edges && p.radius < NODES_IN_RADIUS * p.spacing;
+        let is_facet = |p: &Place| has_facets && p.radius < FACET * p.spacing;
         let deep = self.deepest.filter(is_deep);
         let place = deep.or(self.finest.filter(is_fine))?;
         let shape = match self.finest.filter(is_fine) {
+            Some(fine) if is_facet(&fine) => format!(
+                "the tool bends within less than the {:.3} mm between the part's nodes, as facets and sharp rounds do, so \
+                 that it",
+                1e3 * fine.spacing
+            ),
             Some(fine) => format!(
-                "the tool is fine for the part's nodes: its radius is {:.3} mm where they are {:.3} mm apart, so that it",
+                "the tool's radius of {:.3} mm is small for nodes that are {:.3} mm apart, so that it",
                 1e3 * fine.radius,
                 1e3 * fine.spacing
             ),
@@ -105,7 +115,7 @@ impl Between {
             ),
         };
         let depth = self.deepest.map_or(0.0, |p| p.depth);
-        let goes_in = if depth > 1e-3 * place.spacing {
+        let goes_in = if depth > 1e-3 * place.spacing && depth > 1e-3 * travel {
             format!(
                 "gets up to {:.3} mm ({:.1} % of the travel) into faces between nodes, where contact at nodes feels \
                  nothing, and",
@@ -115,11 +125,19 @@ impl Between {
         } else {
             "can lie between them unfelt and".to_owned()
         };
-        let radius = place.radius.max(0.1 * place.spacing);
+        // Facets are as fine as their file makes them, and no mesh follows them.
+        let mend = if is_facet(&place) {
+            "give a round tool finer facets or the shape of a cylinder, sphere or capsule, a sharp edge a round, or mesh the \
+             contact faces finer"
+                .to_owned()
+        } else {
+            format!(
+                "mesh the contact faces finer (nodes about {:.2} mm apart) or raise accuracy.order",
+                1e3 * (0.5 * place.radius / NODES_IN_RADIUS).min(0.5 * place.spacing)
+            )
+        };
         Some(format!(
-            "{shape} {goes_in} meets the nodes one by one: force and work are wrong there; mesh the contact faces finer \
-             (nodes about {:.2} mm apart) or raise accuracy.order",
-            1e3 * (0.5 * radius / NODES_IN_RADIUS).min(0.5 * place.spacing),
+            "{shape} {goes_in} meets the nodes one by one: force and work are wrong there; {mend}"
         ))
     }
 }
@@ -253,7 +271,9 @@ impl<'a> BetweenNodes<'a> {
 
     /// `travel`: of the whole run, m.
     pub(crate) fn warning(&self, travel: f64) -> Option<String> {
-        self.between.warning(travel, self.engine.has_edges())
+        let has_facets = matches!(self.engine.tool(), Tool::Mesh(_) | Tool::Field(_));
+        self.between
+            .warning(travel, self.engine.has_edges(), has_facets)
     }
 }
 
@@ -287,20 +307,23 @@ mod tests {
             assert!((here.depth - 0.7e-3).abs() < 2e-6, "{here:?}");
             assert!((here.radius - 1e-3).abs() < 1e-5, "{here:?}");
             assert!((here.spacing - (8e-3 + 4e-3 * 2f64.sqrt()) / 3.0).abs() < 1e-12);
-            let words = between.warning(4e-3, false).unwrap();
-            for part in ["1.000 mm where they are 4.552 mm", "0.700 mm (17.5 %"] {
+            let words = between.warning(4e-3, false, false).unwrap();
+            for part in [
+                "1.000 mm is small for nodes that are 4.552 mm",
+                "0.700 mm (17.5 %",
+            ] {
                 assert!(words.contains(part), "{words}");
             }
         }
         assert_eq!(look(&ball, at(1.3, 1.1, 1.5)), Between::default());
         // At the face, not in it: too fine all the same, unless its shape is felt in faces.
         let touching = look(&ball, at(1.3, 1.1, 1.0));
-        assert!(touching.warning(4e-3, false).is_some());
-        assert_eq!(touching.warning(4e-3, true), None);
+        assert!(touching.warning(4e-3, false, false).is_some());
+        assert_eq!(touching.warning(4e-3, true, false), None);
         // A flat tool has no radius, and lies on the nodes.
         let flat = Tool::Box(BoxShape::new(DVec3::splat(0.1)).unwrap());
         let between = look(&flat, at(0.0, 0.0, 100.0));
         assert_eq!(between.deepest.unwrap().radius, f64::INFINITY);
-        assert_eq!(between.warning(4e-3, false), None);
+        assert_eq!(between.warning(4e-3, false, false), None);
     }
 }

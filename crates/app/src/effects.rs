@@ -35,6 +35,8 @@ pub struct Verdict {
     pub on: bool,
     /// Estimate of what it would change, if one could be made.
     pub number: Option<f64>,
+    /// N that friction would add to the pull on the way out, where a flank was seen that lets go.
+    pub added_on_the_way_out: Option<f64>,
     /// Number from which the effect matters.
     pub threshold: f64,
     /// In words, with units.
@@ -57,6 +59,7 @@ pub fn judge(observed: &Observed) -> Vec<Verdict> {
         name,
         on: false,
         number: None,
+        added_on_the_way_out: None,
         threshold: FORCE_TOLERANCE,
         why: why.to_owned(),
         missing: false,
@@ -67,6 +70,7 @@ pub fn judge(observed: &Observed) -> Vec<Verdict> {
             name: "large_rotation",
             on: false,
             number: Some(rotation),
+            added_on_the_way_out: None,
             threshold: ROTATION_LIMIT_DEG,
             why: format!(
                 "material points turn by up to {rotation:.1} degrees; {}",
@@ -82,10 +86,17 @@ pub fn judge(observed: &Observed) -> Vec<Verdict> {
             name: "continuous_collision",
             on: false,
             number: Some(observed.motion_per_feature),
+            added_on_the_way_out: None,
             threshold: TUNNELLING_LIMIT,
             why: format!(
-                "the tool moves at most {:.1e} of the smallest feature in a period",
-                observed.motion_per_feature
+                "in the hand's run the tool moves at most {:.2} of the smallest feature in a period{}",
+                observed.motion_per_feature,
+                if observed.motion_per_feature > TUNNELLING_LIMIT {
+                    "; write a lower hand.speed, a stiffer hand.stiffness that does not jump, or a shorter \
+                     device.servo_period (the part's own curve has no such steps)"
+                } else {
+                    ""
+                }
             ),
             missing: observed.motion_per_feature > TUNNELLING_LIMIT,
         },
@@ -116,6 +127,7 @@ fn friction(observed: &Observed) -> Verdict {
         name: "friction",
         on: false,
         number,
+        added_on_the_way_out: None,
         threshold: FORCE_TOLERANCE,
         why,
         missing,
@@ -160,7 +172,11 @@ fn friction(observed: &Observed) -> Verdict {
          {degrees:.1} degrees and friction's angle of {phi:.1}{out}",
         100.0 * share
     );
-    verdict(Some(share), share > FORCE_TOLERANCE || locks_out, why)
+    let release = observed.release.as_ref();
+    Verdict {
+        added_on_the_way_out: release.and_then(|release| release.friction(mu)),
+        ..verdict(Some(share), share > FORCE_TOLERANCE || locks_out, why)
+    }
 }
 
 fn without_coefficient(ramp: &Ramp, from: Option<f64>) -> String {

@@ -14,6 +14,7 @@ use crate::between::BetweenNodes;
 use crate::choice::Why;
 use crate::drive::Driven;
 use crate::effects::{Observed, Ramp, Verdict, judge};
+use crate::elsewhere::Elsewhere;
 use crate::engine::{Engine, Stage};
 use crate::fields::FieldSolver;
 use crate::machine::Machine;
@@ -73,8 +74,17 @@ impl Story<'_> {
         let snap = part_curve.snap().map(|snap| snap.row_idx);
         let moments = Moments::of(recording, snap);
         let mut between = BetweenNodes::new(prepared, self.engine);
-        let strained = self.strain(&solver, &moments.sampled(), &mut |u, record| {
+        let mut elsewhere = Elsewhere::new(&prepared.loaded, self.engine.tool());
+        // Behind the largest peak that is passed, more force than there is that of the seat.
+        let is_seat = |i: usize| {
+            let snap = part_curve.snap();
+            snap.is_some_and(|snap| {
+                i > snap.row_idx && recording.resistance(&recording.records[i]) > snap.force_n
+            })
+        };
+        let strained = self.strain(&solver, &moments.sampled(), is_seat, &mut |u, record| {
             between.look(u, &record.report.tool_pose);
+            elsewhere.look(u, &record.report.tool_pose, record.travel);
         })?;
         let (frames, drawn_rotation) = self.frames(&solver, &moments, strained.index);
         let max_rotation = strained.max_rotation.max(drawn_rotation);
@@ -94,11 +104,17 @@ impl Story<'_> {
             .iter()
             .filter(|w| w.id == "teeth" && w.number > Some(MOST_TOOTH));
         doubts.extend(teeth.map(|w| w.text.clone()));
+        let elsewhere = elsewhere.warning(way);
+        doubts.extend(elsewhere.clone());
+        let aside = self.doubts.iter().filter(|w| w.id == "left-symmetry-plane");
+        doubts.extend(aside.map(|w| w.text.clone()));
         // A way that ends behind the snap ends at a seat.
         doubts.extend(self.stopped().filter(|_| snap.is_none()));
         let driven = self.judged(&verdicts, doubts, &strained.facts);
         let mut warnings = self.remarks.clone();
         warnings.extend(between);
+        warnings.extend(elsewhere);
+        warnings.extend(part_curve.ends_in_the_fall());
         warnings.extend(self.stopped());
         warnings.extend(verdicts.iter().filter_map(words::called_for));
         warnings.extend(self.troubles());
@@ -207,12 +223,17 @@ impl Story<'_> {
         others: Vec<String>,
         strain: &StrainFacts,
     ) -> report::Driven {
+        // What the scene leaves out on purpose is told, and the curve is complete without it. No step of the drive goes
+        // through anything: that is a matter of the hand.
+        let counts = |v: &&Verdict| {
+            choice(self.scene, v.name) == EffectChoice::Auto && v.name != "continuous_collision"
+        };
+        let missing = || effects.iter().filter(counts);
+        let friction = missing().find(|v| v.missing && v.name == "friction");
         let doubts = Doubts {
-            missing_effects: effects.iter().filter_map(words::called_for).collect(),
-            friction_share: effects
-                .iter()
-                .find(|v| v.missing && v.name == "friction")
-                .and_then(|v| v.number),
+            missing_effects: missing().filter_map(words::called_for).collect(),
+            friction_share: friction.and_then(|v| v.number),
+            friction_out_n: friction.and_then(|v| v.added_on_the_way_out),
             others,
         };
         let asked = &self.scene.limits;

@@ -13,6 +13,7 @@ pub mod cli;
 pub mod crash;
 pub mod drive;
 pub mod effects;
+mod elsewhere;
 pub mod engine;
 mod error;
 mod evaluate;

@@ -4,6 +4,7 @@
 //! [`of_part`] need the mesh and the scene only, those of [`before`] the tool too, those of [`after`] a
 //! recording. None of them refuses anything: what is doubtful may be meant.
 
+mod aside;
 mod bounce;
 mod coupling;
 mod gave_way;
@@ -11,6 +12,7 @@ mod groups;
 mod order;
 mod script;
 mod seam;
+mod spike;
 mod teeth;
 mod touch;
 mod track;
@@ -93,12 +95,16 @@ pub(crate) fn after(
             .filter(|_| ran.driven.stopped_at.is_none()),
         bounce::negative_work(&track),
         teeth::from_node_to_node(&track, driven, &ran.prepared.loaded),
+        spike::stands_alone(&track),
+        aside::driven(scene, driven),
     ]
     .into_iter()
     .flatten()
     .collect();
     if let (Some(felt), Some(hand)) = (ran.felt, &scene.hand) {
         warnings.extend(of_hand(scene, hand, felt, &track));
+        warnings.extend(aside::felt(scene, felt, track.peak_force));
+        warnings.extend(aside::felt_nothing(felt, driven));
     }
     warnings.extend(order::checked(
         scene,
@@ -118,7 +124,7 @@ fn of_hand(scene: &Scene, hand: &Hand, felt: &Recording, driven: &Track) -> Vec<
         bounce::bounced(&track),
         bounce::negative_work(&track).filter(|_| bounce::negative_work(driven).is_none()),
         coupling::too_stiff(scene, hand, felt),
-        gave_way::gave_way(&track, driven, scene.coupling.translational_stiffness),
+        gave_way::gave_way(scene, &track, driven),
     ];
     warnings.into_iter().flatten().collect()
 }

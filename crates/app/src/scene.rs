@@ -78,6 +78,56 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// A stiffness (N/m) in the scene's unit, with it, as the scene would have to say it.
+    pub fn stiffness_words(&self, newtons_per_metre: f64) -> String {
+        self.in_units("stiffness", units::Quantity::Stiffness, newtons_per_metre)
+    }
+
+    /// A mass (kg), likewise.
+    pub fn mass_words(&self, kilograms: f64) -> String {
+        self.in_units("mass", units::Quantity::Mass, kilograms)
+    }
+
+    /// A damping (N s/m), likewise.
+    pub fn damping_words(&self, newton_seconds_per_metre: f64) -> String {
+        self.in_units(
+            "damping",
+            units::Quantity::Damping,
+            newton_seconds_per_metre,
+        )
+    }
+
+    /// A pressure (Pa), likewise.
+    pub fn pressure_words(&self, pascals: f64) -> String {
+        self.in_units("pressure", units::Quantity::Pressure, pascals)
+    }
+
+    /// A rotational stiffness (N m/rad), likewise.
+    pub fn rotational_stiffness_words(&self, newton_metres: f64) -> String {
+        self.in_units(
+            "rotational_stiffness",
+            units::Quantity::RotationalStiffness,
+            newton_metres,
+        )
+    }
+
+    fn in_units(&self, name: &str, quantity: units::Quantity, si: f64) -> String {
+        let (of_si, of_mm) = units::labels(name).unwrap_or_default();
+        let unit = match self.units {
+            Units::Si => of_si,
+            Units::MmNMpa => of_mm,
+        };
+        // Nine digits: what a scene says in mm is the same again.
+        let value = si / units::to_si(self.units, quantity);
+        let value = format!("{value:.8e}").parse().unwrap_or(value);
+        let plain = (1e-4..1e7).contains(&f64::abs(value)) || value == 0.0;
+        if plain {
+            format!("{value} {unit}")
+        } else {
+            format!("{value:e} {unit}")
+        }
+    }
+
     /// Length unit of the file: its name, and m.
     pub fn length_unit(&self) -> (&'static str, f64) {
         match self.units {

@@ -272,7 +272,7 @@ fn a_smooth_tool_between_nodes_is_warned_of_with_its_depth() {
         let told = warning(&text.replace("travel = 0.001", "travel = 0.004"));
         assert_eq!(told.len(), 1, "order {order}");
         assert!(
-            told[0].contains("its radius is 1.000 mm where they are"),
+            told[0].contains("radius of 1.000 mm is small for nodes that are"),
             "{told:?}"
         );
         assert!(told[0].contains("% of the travel)"), "{told:?}");
@@ -291,7 +291,7 @@ fn a_smooth_tool_between_nodes_is_warned_of_with_its_depth() {
     };
     let told = warning(&lid("0.0005"));
     assert!(
-        told.len() == 1 && told[0].contains("its radius is 0.5"),
+        told.len() == 1 && told[0].contains("radius of 0.5"),
         "{told:?}"
     );
     assert_eq!(warning(&lid("0.006")).len(), 0);

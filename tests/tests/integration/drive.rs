@@ -134,6 +134,43 @@ fn a_quarter_between_planes_of_symmetry_is_widened_as_the_whole() {
     let expected = 0.5 * pressure * interference * quarter;
     near(&summary["curve"]["net_work_J"], expected, 0.01 * expected);
     assert_eq!(summary["curve"]["sideways_m"], 0.0);
+    // The hand of the default stiffness beside it is told to have left the planes.
+    assert!(warned(&summary, "hand-aside").contains("symx, symy"));
+    let free = scene.replace("[hand]", "[drive]\nguide = \"free\"\n[hand]");
+    let summary = run(folder.path(), &free);
+    assert_eq!(summary["verdict"]["outcome"], "incomplete");
+    assert!(warned(&summary, "left-symmetry-plane").contains("drive.guide = \"axis\""));
+}
+
+/// Text of a warning; empty without it.
+fn warned(summary: &Value, id: &str) -> String {
+    let warnings = summary["warnings"].as_array().unwrap();
+    let found = warnings.iter().find(|warning| warning["id"] == id);
+    found.map_or_else(String::new, |warning| {
+        warning["text"].as_str().unwrap().to_owned()
+    })
+}
+
+/// A slab of 2 mm goes into the hook's arm where nothing is named as contact: a node is 1 mm deep in it at most.
+#[test]
+fn a_tool_that_goes_through_what_is_no_contact_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = root().join("scenes/hook.msh").display().to_string();
+    let scene = |height: f64| {
+        format!(
+            "units = \"mm-N-MPa\"\n[part]\nmesh = {mesh:?}\nfixed = \"fixed\"\ncontact = \"contact\"\n\
+             material = {{ young_modulus = 1300.0, poisson_ratio = 0.42 }}\n\
+             [tool]\nshape = \"box\"\nhalf_extents = [3, 1, 5]\nposition = [8, {height}, 3]\n\
+             [drive]\ndirection = [0, -1, 0]\ntravel = 2.0\n{QUIET}"
+        )
+    };
+    let summary = run(folder.path(), &scene(1.5));
+    assert_eq!(summary["verdict"]["outcome"], "incomplete");
+    let reasons = summary["verdict"]["reasons"].to_string();
+    assert!(reasons.contains("up to 1.000 mm deep"), "{reasons}");
+    // Beside the arm it goes through nothing.
+    let summary = run(folder.path(), &scene(3.5));
+    assert_eq!(summary["verdict"]["outcome"], "does not snap");
 }
 
 /// The hook's edge on a guide that gives way across the direction, as stiff as the arm is.

@@ -199,7 +199,7 @@ fn a_tool_that_passes_by_is_told_with_the_nearest_distance() {
     let told = clip(|text| text.replace("[0.0, 0.014, 0.005]", "[0.0, 0.030, 0.005]"));
     let (text, distance) = told.expect("no-contact");
     assert!(distance > 0.0 && distance < 0.005, "{text}");
-    assert!(text.contains("hand.travel"), "{text}");
+    assert!(text.contains("travel and the units"), "{text}");
 }
 
 /// Ramps of shipped scenes are no doubt; the edge's force does step from node to node behind its peak.

@@ -131,11 +131,14 @@ impl StrainPeaks {
 
     /// Largest of the free skin, or of all where there is none; 0 of nothing.
     pub(crate) fn value(&self) -> f64 {
+        self.governing().map_or(0.0, |p| p.value)
+    }
+
+    /// That of [`Self::value`].
+    fn governing(&self) -> Option<StrainPeak> {
         let free = self.peaks.iter().find(|p| p.kind == PeakKind::Free);
-        free.map_or_else(
-            || self.peaks.iter().map(|p| p.value).fold(0.0, f64::max),
-            |p| p.value,
-        )
+        let largest = || self.peaks.iter().max_by(|a, b| a.value.total_cmp(&b.value));
+        free.or_else(largest).copied()
     }
 
     /// All, for the report.
@@ -155,14 +158,17 @@ pub(super) struct Strained {
 
 impl Story<'_> {
     /// Solves for the sampled records, and for more around the one with the largest strain; `also` sees each of them.
+    /// `is_seat`: whether the body is pressed into its seat there, which is told apart.
     pub(super) fn strain(
         &self,
         solver: &FieldSolver<'_>,
         sampled: &[usize],
+        is_seat: impl Fn(usize) -> bool,
         also: &mut dyn FnMut(&[f64], &Record),
     ) -> Result<Strained, Error> {
         let recording = &self.driven.recording;
         let mut peaks = StrainPeaks::default();
+        let mut of_seat = StrainPeaks::default();
         let mut max_rotation = 0.0f64;
         let mut seen = BTreeSet::new();
         let mut look = |index: usize| {
@@ -187,17 +193,28 @@ impl Story<'_> {
                     force_n: recording.resistance(record) + 0.0,
                 },
             );
-            peaks.merge(&here);
+            let kept = if is_seat(index) {
+                &mut of_seat
+            } else {
+                &mut peaks
+            };
+            kept.merge(&here);
             seen.insert(index);
             Ok(here.value())
         };
+        let (at_seat, sampled): (Vec<usize>, Vec<usize>) =
+            sampled.iter().partition(|&&index| is_seat(index));
+        at_seat
+            .into_iter()
+            .try_for_each(|index| look(index).map(|_| ()))?;
         let values = sampled
             .iter()
             .map(|&index| look(index))
             .collect::<Result<Vec<f64>, Error>>()?;
-        let index = search_peak(sampled, &values, &mut look)?;
+        let index = search_peak(&sampled, &values, &mut look)?;
         let facts = StrainFacts {
             peaks: peaks.into_vec(),
+            at_seat: of_seat.governing(),
             permissible: self.scene.part.material.permissible_strain,
             n_moments: seen.len(),
         };

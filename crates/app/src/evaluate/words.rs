@@ -78,13 +78,13 @@ impl Story<'_> {
             pair(
                 "material",
                 format!(
-                    "{}E {:.4e} Pa, Poisson's ratio {}",
+                    "{}E {}, Poisson's ratio {}",
                     material
                         .name
                         .as_ref()
                         .map(|n| format!("{n}, "))
                         .unwrap_or_default(),
-                    material.young_modulus,
+                    scene.pressure_words(material.young_modulus),
                     material.poisson_ratio
                 ),
             ),
@@ -153,19 +153,20 @@ impl Story<'_> {
             pair(
                 "hand",
                 format!(
-                    "{} mm at {} mm/s, {} kg on {} N/m and {} N s/m",
+                    "{} mm at {} mm/s, {} on {} and {}",
                     1e3 * hand.travel,
                     1e3 * hand.speed,
-                    hand.mass,
-                    hand.stiffness,
-                    hand.damping
+                    scene.mass_words(hand.mass),
+                    scene.stiffness_words(hand.stiffness),
+                    scene.damping_words(hand.damping)
                 ),
             ),
             pair(
                 "virtual coupling",
                 format!(
-                    "{} N/m, {} N m/rad",
-                    scene.coupling.translational_stiffness, scene.coupling.rotational_stiffness
+                    "{}, {}",
+                    scene.stiffness_words(scene.coupling.translational_stiffness),
+                    scene.rotational_stiffness_words(scene.coupling.rotational_stiffness)
                 ),
             ),
             pair(

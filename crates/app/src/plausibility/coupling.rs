@@ -20,6 +20,7 @@ const SLOW_SHARE: f64 = 1e-2;
 pub(super) fn too_stiff(scene: &Scene, hand: &Hand, recording: &Recording) -> Option<Warning> {
     let stiffness = felt_stiffness(recording)?.min(scene.coupling.translational_stiffness);
     judged(
+        scene,
         stiffness,
         scene.device.servo_period,
         hand.mass,
@@ -29,7 +30,14 @@ pub(super) fn too_stiff(scene: &Scene, hand: &Hand, recording: &Recording) -> Op
 }
 
 /// A held force lags by half a period, which acts like a damping of -K T/2 (Colgate and Schenkel 1997).
-fn judged(stiffness: f64, period: f64, mass: f64, damping: f64, coupling: f64) -> Option<Warning> {
+fn judged(
+    scene: &Scene,
+    stiffness: f64,
+    period: f64,
+    mass: f64,
+    damping: f64,
+    coupling: f64,
+) -> Option<Warning> {
     let number = stiffness * period * period / mass;
     let fed = 0.5 * stiffness * period;
     if number < UNDAMPED || (number < ALWAYS && fed <= damping) {
@@ -42,18 +50,27 @@ fn judged(stiffness: f64, period: f64, mass: f64, damping: f64, coupling: f64) -
         "stiff-coupling",
         number,
         format!(
-            "coupling and part in series are {} N/m, too stiff for a handle of {} kg and a period of {} s: K T^2/m is {} \
-             (0.1 is safe), and holding the force for a period feeds in what {} N s/m of damping would have to take out; \
-             write coupling.translational_stiffness = {:.0e} (it is {:.0e}) or a shorter device.servo_period",
-            short(stiffness),
-            short(mass),
+            "coupling and part in series are {}, too stiff for a handle of {} and a period of {} s: K T^2/m is {} (0.1 is \
+             safe), and holding the force for a period feeds in what a damping of {} would have to take out; write \
+             coupling.translational_stiffness = {} (it is {}) or a shorter device.servo_period",
+            scene.stiffness_words(rounded(stiffness)),
+            scene.mass_words(mass),
             short(period),
             short(number),
-            short(fed),
-            fitting.min(0.5 * stiffness),
-            coupling,
+            scene.damping_words(rounded(fed)),
+            scene.stiffness_words(
+                format!("{:.0e}", fitting.min(0.5 * stiffness))
+                    .parse()
+                    .unwrap_or(fitting)
+            ),
+            scene.stiffness_words(coupling),
         ),
     ))
+}
+
+/// To three digits.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.2e}").parse().unwrap_or(value)
 }
 
 /// N/m, change of the wrench over the handle's motion, the median of the periods with contact.
@@ -83,9 +100,16 @@ fn felt_stiffness(recording: &Recording) -> Option<f64> {
 mod tests {
     use super::*;
 
+    fn clip() -> Scene {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
+        Scene::load(&folder.join("clip.toml")).unwrap()
+    }
+
     #[test]
     fn what_the_hand_damps_is_let_pass_and_what_it_does_not_is_told() {
-        let judge = |k: f64, damping: f64| judged(k, 1e-3, 0.5, damping, k).map(|w| w.number);
+        let scene = clip();
+        let judge =
+            |k: f64, damping: f64| judged(&scene, k, 1e-3, 0.5, damping, k).map(|w| w.number);
         // K T^2/m of 0.02, 0.2, 2 and 20; K T/2 of 5, 50, 500 and 5000.
         assert_eq!(judge(1e4, 0.0), None);
         assert_eq!(judge(1e5, 63.0), None);
@@ -102,11 +126,11 @@ mod tests {
             (1e6, 1e-2, 0.1, 0.0),
             (1e5, 1e-3, 0.02, 20.0),
         ] {
-            let text = judged(k, period, mass, damping, k).unwrap().text;
+            let text = judged(&clip(), k, period, mass, damping, k).unwrap().text;
             let from = text.find("stiffness = ").unwrap() + "stiffness = ".len();
             let written: f64 = text[from..].split(' ').next().unwrap().parse().unwrap();
             assert!(
-                judged(written, period, mass, damping, written).is_none(),
+                judged(&clip(), written, period, mass, damping, written).is_none(),
                 "{text}"
             );
         }

@@ -4,12 +4,13 @@ use super::track::Track;
 use super::units::short;
 use super::warning;
 use crate::report::Warning;
+use crate::scene::Scene;
 
 /// Of the way that was asked for and is open, what the body must have gone.
 const SHARE: f64 = 0.9;
 
-/// The body went less far than its handle was sent, although the part lets it through. `coupling`: its stiffness, N/m.
-pub(super) fn gave_way(felt: &Track, driven: &Track, coupling: f64) -> Option<Warning> {
+/// The body went less far than its handle was sent, although the part lets it through.
+pub(super) fn gave_way(scene: &Scene, felt: &Track, driven: &Track) -> Option<Warning> {
     let furthest = |track: &Track| track.samples.iter().map(|s| s.travel).fold(0.0, f64::max);
     let (went, open) = (furthest(felt), furthest(driven).min(felt.commanded));
     if went >= SHARE * open {
@@ -20,17 +21,20 @@ pub(super) fn gave_way(felt: &Track, driven: &Track, coupling: f64) -> Option<Wa
     let (key, now) = if felt.commanded - handle >= handle - went {
         ("hand.stiffness", felt.grip)
     } else {
-        ("coupling.translational_stiffness", coupling)
+        (
+            "coupling.translational_stiffness",
+            scene.coupling.translational_stiffness,
+        )
     };
     Some(warning(
         "hand-gave-way",
         went,
         format!(
             "the hand gave way: the body went {} of {} mm, and what was felt is the way up to there; raise {key} (it is \
-             {:.1e} N/m, and the part's own curve goes up to {} N)",
+             {}, and the part's own curve goes up to {} N)",
             short(1e3 * went),
             short(1e3 * open),
-            now,
+            scene.stiffness_words(now),
             short(driven.peak_force),
         ),
     ))
@@ -57,11 +61,17 @@ mod tests {
         )
     }
 
+    fn clip() -> Scene {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
+        Scene::load(&folder.join("clip.toml")).unwrap()
+    }
+
     #[test]
     fn a_body_that_stays_behind_is_told_with_the_spring_that_gave_way() {
         let driven = track(14.0, 14.0, 14.0);
-        assert_eq!(gave_way(&track(13.9, 14.0, 14.0), &driven, 1e4), None);
-        let soft_hand = gave_way(&track(1.6, 2.0, 4.5), &driven, 1e4).unwrap();
+        let scene = clip();
+        assert_eq!(gave_way(&scene, &track(13.9, 14.0, 14.0), &driven), None);
+        let soft_hand = gave_way(&scene, &track(1.6, 2.0, 4.5), &driven).unwrap();
         assert!(
             soft_hand.text.contains("1.60 of 4.50 mm"),
             "{}",
@@ -72,7 +82,7 @@ mod tests {
             "{}",
             soft_hand.text
         );
-        let soft_coupling = gave_way(&track(1.6, 4.4, 4.5), &driven, 1e4).unwrap();
+        let soft_coupling = gave_way(&scene, &track(1.6, 4.4, 4.5), &driven).unwrap();
         assert!(
             soft_coupling.text.contains("raise coupling"),
             "{}",
@@ -80,7 +90,7 @@ mod tests {
         );
         // Nothing lets the body further, whatever holds it.
         assert_eq!(
-            gave_way(&track(1.6, 4.4, 4.5), &track(1.6, 1.6, 4.5), 1e4),
+            gave_way(&scene, &track(1.6, 4.4, 4.5), &track(1.6, 1.6, 4.5)),
             None
         );
     }

@@ -20,6 +20,10 @@ const TOLERANCE: f64 = 0.05;
 const TOLERANCE_LEFT: f64 = 0.15;
 /// s: what preparing the part at another order may take by its forecast.
 const AFFORDABLE_S: f64 = 10.0;
+/// The same where only the mesh may be coarse: coarse ones are cheap.
+const COARSE_S: f64 = 0.5;
+/// Share of the peak by which quadratic elements may differ from cubic ones: more is a mesh too coarse to bend.
+const TOLERANCE_COARSE: f64 = 0.1;
 /// The highest order there is.
 const HIGHEST: u8 = 3;
 
@@ -54,9 +58,14 @@ pub(super) fn checked(
     let order = prepared.loaded.mesh.order;
     let nu = scene.part.material.poisson_ratio;
     let may_lock = nu > NEARLY_INCOMPRESSIBLE;
-    if order != Order::Linear && !may_lock {
+    if order == Order::Cubic && !may_lock {
         return Ok(None);
     }
+    let affordable = if order == Order::Linear || may_lock {
+        AFFORDABLE_S
+    } else {
+        COARSE_S
+    };
     let at = |order: u8| -> Result<Peak, Error> {
         if peak <= 0.0 {
             return Ok(Peak::Unknown("nothing resisted".to_owned()));
@@ -64,7 +73,7 @@ pub(super) fn checked(
         if prepared.bubbles.is_some() {
             return Ok(Peak::Unknown("interface nodes are constrained".to_owned()));
         }
-        match peak_at(scene, order, options) {
+        match peak_at(scene, order, affordable, options) {
             Err(e) if e.is_interrupt() => Err(e),
             Err(e) => Ok(Peak::Unknown(e.to_string())),
             Ok(peak) => Ok(peak),
@@ -76,20 +85,27 @@ pub(super) fn checked(
             let third = may_lock.then(|| at(HIGHEST)).transpose()?;
             Some(of_linear(nu, peak, &second, third.as_ref()))
         }
-        Order::Quadratic => of_quadratic(nu, peak, &at(HIGHEST)?),
+        Order::Quadratic if may_lock => of_quadratic(nu, peak, &at(HIGHEST)?),
+        Order::Quadratic => of_coarse(peak, &at(HIGHEST)?),
         Order::Cubic => of_cubic(nu, peak, &at(2)?, &at(1)?),
     })
 }
 
 /// The peak of the same scene on the same mesh at another order.
-fn peak_at(scene: &Scene, order: u8, options: &PrepareOptions) -> Result<Peak, Error> {
+/// `affordable`: s that preparing may take.
+fn peak_at(
+    scene: &Scene,
+    order: u8,
+    affordable: f64,
+    options: &PrepareOptions,
+) -> Result<Peak, Error> {
     let mut scene = scene.clone();
     scene.part.order = Some(order);
     scene.accuracy.budget_us = None;
     scene.drive.retract = false;
     let spec = setup::part_spec(&scene)?;
     let seconds = Forecast::of(&load(&spec)?).seconds;
-    if seconds > AFFORDABLE_S {
+    if seconds > affordable {
         let why = format!("preparing it would take about {}", duration(seconds));
         return Ok(Peak::Unknown(why));
     }
@@ -101,6 +117,26 @@ fn peak_at(scene: &Scene, order: u8, options: &PrepareOptions) -> Result<Peak, E
     let (_, driven) = drive::of_scene(&scene, &prepared, tool, &progress)?;
     let track = super::track::Track::of_drive(&scene, &driven.recording);
     Ok(Peak::Of(track.peak_force))
+}
+
+/// Quadratic elements in an ordinary material, where they are few: nothing is told of what is not computed.
+fn of_coarse(peak: f64, third: &Peak) -> Option<Warning> {
+    let third = third.newtons()?;
+    let ratio = peak / third;
+    if (ratio - 1.0).abs() <= TOLERANCE_COARSE {
+        return None;
+    }
+    Some(warning(
+        "coarse",
+        ratio - 1.0,
+        format!(
+            "the mesh is coarse for what it bends: the peak is {} N, the same mesh gives {} N at order 3, {:.0} % apart; \
+             write order = 3 under [accuracy], or make the mesh finer",
+            short(peak),
+            short(third),
+            100.0 * (ratio - 1.0).abs(),
+        ),
+    ))
 }
 
 fn nearly_incompressible(nu: f64) -> String {

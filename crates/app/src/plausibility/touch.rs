@@ -69,7 +69,7 @@ pub(super) fn nothing_touched(
                 place(rest.node),
             );
         }
-        None => text += "; check tool.position, hand.direction, hand.travel and the units",
+        None => text += "; check tool.position, direction, travel and the units",
     }
     Some(warning("no-contact", contact.distance, text))
 }

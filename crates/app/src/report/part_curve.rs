@@ -23,6 +23,7 @@ pub(crate) mod words;
 mod work;
 
 use super::data::{DriveRow, Phase};
+use super::plot::short;
 
 pub use humps::{HUMP_SHARE, Hump};
 pub use limits::{LimitFact, LimitState, Limits, StrainUse};
@@ -172,6 +173,21 @@ impl PartCurve {
     pub fn further_humps(&self) -> impl Iterator<Item = &Hump> {
         let others = self.humps.iter().enumerate();
         others.filter_map(|(idx, hump)| (Some(idx) != self.snap_idx).then_some(hump))
+    }
+
+    /// In words, a way in that ends while the force falls from the snap: the body is not home, and what pulls it out again is
+    /// not what holds it there.
+    pub(crate) fn ends_in_the_fall(&self) -> Option<String> {
+        let snap = self.snap()?;
+        let is_falling = self.end_trend == Trend::Falling;
+        (is_falling && self.end.force_n.abs() > humps::GONE_SHARE * snap.force_n).then(|| {
+            format!(
+                "the way in ends in the fall, {} N at {} mm, before the body is home: the pull out is not what holds it there; \
+                 go on further with drive.travel",
+                short(self.end.force_n),
+                short(1e3 * self.end.travel_m)
+            )
+        })
     }
 
     /// Force that pushing in takes: the snap's peak, or, where nothing snaps, the largest resistance.

@@ -239,6 +239,7 @@ pub(super) fn run() -> Run {
             kind: PeakKind::Free,
         }],
         permissible: Some(0.04),
+        at_seat: None,
         n_moments: 40,
     };
     Run {

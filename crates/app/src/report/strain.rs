@@ -65,11 +65,7 @@ pub struct StrainPeak {
 impl StrainPeak {
     /// "0.553 ± 0.061 %".
     pub fn percent(&self) -> String {
-        format!(
-            "{} ± {} %",
-            short(100.0 * self.value),
-            short(100.0 * self.error)
-        )
+        with_bar(100.0 * self.value, 100.0 * self.error) + " %"
     }
 
     /// Node, coordinates in mm, travel in mm and force in N.
@@ -84,6 +80,21 @@ impl StrainPeak {
     }
 }
 
+/// A value and its bar, which is known to two digits, and the value no better: "0.71 ± 0.11".
+fn with_bar(value: f64, bar: f64) -> String {
+    let digits = 1.0 - bar.log10().floor();
+    if !(0.0..=9.0).contains(&digits) {
+        return format!("{} ± {}", short(value), short(bar));
+    }
+    let rounded = |x: f64| {
+        let text = format!("{x:.*}", digits as usize);
+        let is_whole = !text.contains('.');
+        let trimmed = text.trim_end_matches('0').trim_end_matches('.');
+        if is_whole { text } else { trimmed.to_owned() }
+    };
+    format!("{} ± {}", rounded(value), rounded(bar))
+}
+
 /// Share of the strain for single use that snap joints bear when they are opened and closed often: "about 60 %" (Covestro,
 /// formerly Bayer MaterialScience, "Snap-Fit Joints for Plastics: A Design Guide").
 pub const REPEATED_SHARE: f64 = 0.6;
@@ -93,6 +104,8 @@ pub const REPEATED_SHARE: f64 = 0.6;
 pub struct StrainFacts {
     /// One of each kind that occurred.
     pub peaks: Vec<StrainPeak>,
+    /// The largest where the body is pressed into its seat harder than over the snap, if it is; not among the others.
+    pub at_seat: Option<StrainPeak>,
     /// Largest strain that the material bears once, if the scene gives it.
     pub permissible: Option<f64>,
     /// Moments that were looked at.
@@ -150,9 +163,11 @@ impl StrainFacts {
 
     /// Sentence above the table.
     pub fn words(&self) -> String {
+        let seat = self.at_seat.as_ref().map(seat_words);
+        let seat = seat.map_or_else(String::new, |words| format!(" {words}."));
         match self.governing() {
             Some(peak) => format!(
-                "{}: {}; {}. {} moments were looked at.",
+                "{}: {}; {}.{seat} {} moments were looked at.",
                 peak.percent(),
                 peak.where_and_when(),
                 self.safety_words(),
@@ -187,6 +202,9 @@ impl StrainFacts {
                 other.kind.words(),
                 other.kind.why()
             );
+        }
+        if let Some(seat) = &self.at_seat {
+            text += &format!("                        {}\n", seat_words(seat));
         }
         text
     }
@@ -244,6 +262,16 @@ impl StrainFacts {
             })
             .collect()
     }
+}
+
+/// The strain of the seat.
+fn seat_words(seat: &StrainPeak) -> String {
+    format!(
+        "{} where it is pressed into its seat, {} N at {} mm: not counted, a matter of how hard it is pushed on",
+        seat.percent(),
+        newtons(seat.force_n),
+        millimetres(seat.travel_m)
+    )
 }
 
 /// mm; below a nanometre is round-off.
@@ -310,6 +338,7 @@ pub(super) struct StrainSummary {
     at_contact: Option<PeakSummary>,
     at_held: Option<PeakSummary>,
     at_inner_edge: Option<PeakSummary>,
+    at_seat: Option<PeakSummary>,
     permissible: Option<f64>,
     safety_once: Option<f64>,
     safety_repeated: Option<f64>,
@@ -318,16 +347,15 @@ pub(super) struct StrainSummary {
 
 pub(super) fn summary(facts: &StrainFacts) -> StrainSummary {
     let peak = facts.governing();
-    let of = |kind| {
-        facts.of(kind).map(|p| PeakSummary {
-            value: p.value,
-            error: p.error,
-            node: p.node_tag,
-            place_m: p.place,
-            travel_m: p.travel_m,
-            force_N: p.force_n,
-        })
+    let told = |p: &StrainPeak| PeakSummary {
+        value: p.value,
+        error: p.error,
+        node: p.node_tag,
+        place_m: p.place,
+        travel_m: p.travel_m,
+        force_N: p.force_n,
     };
+    let of = |kind| facts.of(kind).map(told);
     StrainSummary {
         value: facts.value(),
         error: peak.map(|p| p.error),
@@ -344,6 +372,7 @@ pub(super) fn summary(facts: &StrainFacts) -> StrainSummary {
         at_contact: of(PeakKind::AtContact),
         at_held: of(PeakKind::AtHeld),
         at_inner_edge: of(PeakKind::AtInnerEdge),
+        at_seat: facts.at_seat.as_ref().map(told),
         permissible: facts.permissible,
         safety_once: facts.safety_once(),
         safety_repeated: facts.safety_repeated(),
@@ -354,6 +383,20 @@ pub(super) fn summary(facts: &StrainFacts) -> StrainSummary {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_bar_has_two_digits_and_its_value_no_more() {
+        for (value, bar, text) in [
+            (0.70713, 0.10911, "0.71 ± 0.11"),
+            (1.2894, 0.3001, "1.29 ± 0.3"),
+            (28.04, 5.0731, "28 ± 5.1"),
+            (120.0, 30.0, "120 ± 30"),
+            (120.4, 314.0, "120 ± 314"),
+            (0.5, 0.0, "0.5 ± 0"),
+        ] {
+            assert_eq!(with_bar(value, bar), text);
+        }
+    }
 
     fn peak(kind: PeakKind, value: f64) -> StrainPeak {
         StrainPeak {
@@ -371,6 +414,7 @@ mod tests {
         StrainFacts {
             peaks: vec![peak(PeakKind::AtHeld, 0.05), peak(PeakKind::Free, 0.01)],
             permissible,
+            at_seat: None,
             n_moments: 40,
         }
     }

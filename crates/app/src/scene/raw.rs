@@ -127,7 +127,7 @@ pub(super) struct SceneRaw {
     /// testing machine. The verdict comes from this curve. A scene with `[hand]` alone lends its
     /// `direction` and `travel`; a scene without either is refused.
     pub(super) drive: Option<At<DriveRaw>>,
-    /// What the part's own curve has to keep; a run that does not ends with exit code 1.
+    /// What the part's own curve has to keep; a run that does not, or of which that is not known, ends with exit code 1. Of a half or quarter model, forces are those of what is meshed.
     pub(super) limits: Option<LimitsRaw>,
     /// A scripted hand that feels the part besides: its target goes along `direction` at `speed`,
     /// rests, and comes back if told; the handle follows it as a mass on a spring and a damper.
@@ -146,7 +146,7 @@ pub(super) struct SceneRaw {
     /// `snapin accuracy` shows what each choice costs in this scene.
     #[serde(default)]
     pub(super) accuracy: AccuracyRaw,
-    /// Effects beyond the small-strain, frictionless, quasi-static model. `"off"`: not looked at.
+    /// Effects beyond the small-strain, frictionless, quasi-static model. `"off"`: left out on purpose; it is told if it would matter, and the verdict stands without it.
     /// `"auto"`: its size is estimated and told. `"on"`: simulated, which this version cannot.
     #[serde(default)]
     pub(super) effects: EffectsRaw,

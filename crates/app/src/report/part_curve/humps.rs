@@ -11,7 +11,7 @@ pub const HUMP_SHARE: f64 = 0.1;
 const LEAST_SHARE: f64 = 1e-6;
 
 /// Share of a peak at which its force counts as gone.
-const GONE_SHARE: f64 = 1e-3;
+pub(super) const GONE_SHARE: f64 = 1e-3;
 
 /// A peak that is passed, and the fall after it.
 #[derive(Clone, Copy, Debug, PartialEq)]

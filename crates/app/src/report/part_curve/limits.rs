@@ -117,9 +117,20 @@ fn insertion(limit: f64, curve: &PartCurve, verdict: &Verdict) -> LimitFact {
     let value = curve.insertion().map_or(0.0, |place| place.force_n);
     let with_friction = verdict.friction_alone.map(|share| value * (1.0 + share));
     let (state, why) = if value < limit {
-        let stands = with_friction.filter(|force| *force < limit);
-        let stands = stands.map(|force| format!(", and about {} N with friction", short(force)));
-        kept(verdict, stands)
+        match with_friction {
+            Some(force) if force < limit => kept(
+                verdict,
+                Some(format!(", and about {} N with friction", short(force))),
+            ),
+            Some(force) => {
+                let why = format!(
+                    ", but about {} N with friction, which is estimated",
+                    short(force)
+                );
+                (LimitState::NotKnown, why)
+            }
+            None => kept(verdict, None),
+        }
     } else {
         (LimitState::Fail, String::new())
     };
@@ -158,10 +169,27 @@ fn removal(limit: f64, curve: &PartCurve, verdict: &Verdict) -> LimitFact {
             (Some(most.force_n), LimitState::NotKnown, text)
         }
         Removal::Out(peak) => {
-            let (state, why) = if peak.force_n > limit {
-                kept(verdict, holds_better(verdict))
-            } else {
-                (LimitState::Fail, String::new())
+            let with_friction = verdict.friction_out_n.map(|added| peak.force_n + added);
+            let (state, why) = match with_friction {
+                _ if peak.force_n > limit => kept(verdict, holds_better(verdict)),
+                Some(force) if force > limit => {
+                    let why = format!(
+                        ", but about {} N with friction, which is estimated",
+                        short(force)
+                    );
+                    (LimitState::NotKnown, why)
+                }
+                _ if curve.ends_in_the_fall().is_some() => {
+                    let why = ", from where the way in ended in the fall: go on further with drive.travel";
+                    (LimitState::NotKnown, why.to_owned())
+                }
+                None if verdict.outcome == Outcome::Incomplete
+                    && verdict.friction_alone.is_none() =>
+                {
+                    let why = ", as far as it is simulated: the verdict is incomplete";
+                    (LimitState::NotKnown, why.to_owned())
+                }
+                _ => (LimitState::Fail, String::new()),
             };
             let text = format!(
                 "removal takes {} N, {wanted}{why}",

@@ -336,6 +336,7 @@ fn what_the_curve_cannot_tell_is_said_with_what_it_looks_like() {
     let doubts = Doubts {
         missing_effects: vec!["friction is called for".into()],
         friction_share: Some(0.6),
+        friction_out_n: Some(3.0),
         others: vec!["another".into()],
     };
     let verdict = Verdict::of(&curve, &doubts);
@@ -366,6 +367,7 @@ fn strained(value: f64, error: f64) -> StrainFacts {
             kind: PeakKind::Free,
         }],
         permissible: None,
+        at_seat: None,
         n_moments: 1,
     }
 }
@@ -427,6 +429,7 @@ fn the_insertion_limit_is_against_the_snap_and_not_against_the_seat() {
     // Where friction alone is missing, and its share is estimated, a limit that is kept with it is kept.
     let estimated = Doubts {
         friction_share: Some(0.6),
+        friction_out_n: Some(3.0),
         ..doubts
     };
     assert_eq!(of(14.87, &estimated).0, LimitState::NotKnown);
@@ -462,6 +465,31 @@ fn the_removal_limit_needs_a_way_out() {
         )
     );
     assert_eq!(of(12.0, &rows).0, LimitState::Fail);
+    // With friction it may hold; and where the way in ended in the fall the pull is not the one from home.
+    let asked = Limits {
+        removal_above: Some(14.0),
+        ..Limits::default()
+    };
+    let estimated = Doubts {
+        missing_effects: vec!["friction".into()],
+        friction_share: Some(0.6),
+        friction_out_n: Some(3.0),
+        others: Vec::new(),
+    };
+    let (state, text) = judged(asked, &rows, &estimated, &StrainFacts::default());
+    assert_eq!(state, LimitState::NotKnown);
+    assert!(text.contains("about 15 N with friction"), "{text}");
+    let too_much = Limits {
+        removal_above: Some(15.1),
+        ..Limits::default()
+    };
+    let (state, _) = judged(too_much, &rows, &estimated, &StrainFacts::default());
+    assert_eq!(state, LimitState::Fail);
+    let mut short = polygon(Approach, &[(0.0, 0.0), (1.0, 10.0), (2.0, 5.0)]);
+    short.extend(polygon(Retract, &[(2.0, 0.0), (1.5, -2.0), (0.0, 0.0)]));
+    let (state, text) = judged(asked, &short, &Doubts::default(), &StrainFacts::default());
+    assert_eq!(state, LimitState::NotKnown);
+    assert!(text.contains("ended in the fall"), "{text}");
     assert_eq!(
         of(12.0004, &rows),
         (
@@ -581,7 +609,7 @@ fn an_incomplete_curve_says_so_first_and_each_reason_on_a_line() {
     assert_eq!(
         words::terminal(&short),
         "  verdict               incomplete; as far as it is simulated, it does not snap\n  \
-         because               1 of 51 steps did not converge: raise accuracy.contact_iterations, or make drive.step smaller\n  \
+         because               1 of 51 steps did not converge: make drive.step smaller, or mesh the contact faces finer\n  \
          because               the force still rises at the end of the way, 21.3 N at 4.5 mm: go on further with drive.travel\n  \
          largest force         21.300 N at 4.500 mm\n  \
          work                  47.9 mJ to push it in, 47.9 mJ at the end of the way\n  \

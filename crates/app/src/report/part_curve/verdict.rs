@@ -38,6 +38,8 @@ pub struct Verdict {
     pub reasons: Vec<String>,
     /// The share by which friction would raise the force of pushing in, where its lack alone makes the curve incomplete.
     pub friction_alone: Option<f64>,
+    /// N by which friction would raise the pull out, in the same case.
+    pub friction_out_n: Option<f64>,
 }
 
 /// What speaks against taking a curve for the part's, beside what the curve itself shows.
@@ -48,6 +50,8 @@ pub struct Doubts {
     pub missing_effects: Vec<String>,
     /// By what share friction would raise the force of pushing in, where it is among them and was estimated.
     pub friction_share: Option<f64>,
+    /// By how much it would raise the pull out, N, likewise.
+    pub friction_out_n: Option<f64>,
     /// Whatever else makes the curve another than the part's, one sentence each.
     pub others: Vec<String>,
 }
@@ -63,12 +67,14 @@ impl Verdict {
                 so_far,
                 reasons: vec![why],
                 friction_alone: None,
+                friction_out_n: None,
             }
         } else {
             Self {
                 outcome: Outcome::Incomplete,
                 so_far,
                 friction_alone: doubts.friction_share.filter(|_| missing.len() == 1),
+                friction_out_n: doubts.friction_out_n.filter(|_| missing.len() == 1),
                 reasons: missing,
             }
         }
@@ -115,7 +121,7 @@ fn missing(curve: &PartCurve, doubts: &Doubts) -> Vec<String> {
     }
     if curve.n_unconverged > 0 {
         reasons.push(format!(
-            "{} of {} steps did not converge: raise accuracy.contact_iterations, or make drive.step smaller",
+            "{} of {} steps did not converge: make drive.step smaller, or mesh the contact faces finer",
             curve.n_unconverged, curve.n_steps
         ));
     }

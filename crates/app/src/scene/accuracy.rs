@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 use super::raw;
 
-/// What accuracy is asked for. The order of the elements is [`Part::order`].
+/// What accuracy is asked for. The order of the elements is [`super::Part::order`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Accuracy {
     /// The goal, if one was named; its settings are in the other fields.

@@ -169,7 +169,13 @@ impl Story<'_> {
             let record = &recording.records[index];
             let u = solver.displacement(recording, record);
             max_rotation = max_rotation.max(solver.extremes(&u).max_rotation);
-            let mut frame = self.frame(label, record, &u, solver.von_mises(&u), tool_extent);
+            let mut frame = self.frame(
+                label,
+                record,
+                u.at_nodes(),
+                solver.von_mises(&u),
+                tool_extent,
+            );
             if strained == Some(index) {
                 frame.strain = solver.principal_strain(&u);
             }

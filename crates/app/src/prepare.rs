@@ -8,6 +8,7 @@ mod bubbles;
 pub mod budget;
 pub mod cache;
 mod demand;
+mod interior;
 mod load;
 mod surface;
 
@@ -28,6 +29,7 @@ use crate::progress::Ui;
 use crate::stored::{Blocks, Source, StoredCompliance};
 use budget::Forecast;
 pub use demand::Demand;
+pub use interior::Interior;
 pub use load::load;
 
 /// A physical group and who asks for it.
@@ -48,6 +50,8 @@ pub struct PartSpec {
     pub length_scale: f64,
     /// Order that the scene asks for; `None`: the mesh's own.
     pub order: Option<u8>,
+    /// Order of the elements inside; `None`: that of the surface.
+    pub interior_order: Option<u8>,
     /// How often each element is divided into eight, before the order is changed.
     pub refinements: u8,
     /// Elasticity.
@@ -134,6 +138,8 @@ pub struct LoadedPart {
     pub mesh: Mesh,
     /// Held degrees of freedom.
     pub supports: Supports,
+    /// What is solved on, where that is not `mesh`.
+    pub interior: Option<Interior>,
     /// Node indices that can touch and may move, ascending.
     pub candidates: Vec<u32>,
     /// Node indices that can touch and are held in all directions, ascending: obstacles that do not give way.
@@ -390,12 +396,13 @@ fn fetched(
     };
     let stiffness = assemble(loaded)?;
     done("assemble the stiffness");
-    let factor = FactoredStiffness::new(&stiffness, &loaded.supports, &progress)
+    let factor = FactoredStiffness::new(&stiffness, loaded.solved_supports(), &progress)
         .map_err(|e| Error::part(path, e))?;
     done("factor");
     // The checks of the whole, of some columns.
     let step = loaded.candidates.len().div_ceil(SAMPLE).max(1);
     let sample: Vec<u32> = loaded.candidates.iter().copied().step_by(step).collect();
+    let sample = loaded.solved_nodes(&sample);
     let checks = Compliance::build(&factor, &sample, &sample, &progress)
         .and_then(|compliance| compliance.check(&stiffness, &factor))
         .map_err(|e| Error::part(path, e))?;
@@ -412,14 +419,14 @@ fn fetched(
 /// Columns that are checked of a part that has not all of them.
 const SAMPLE: usize = 32;
 
-/// Stiffness of a loaded part.
+/// Stiffness of a loaded part, of the mesh that is solved on.
 ///
 /// # Errors
 /// As `fem` reports them, with the mesh's path.
 pub fn assemble(loaded: &LoadedPart) -> Result<fem::Stiffness, Error> {
     let of_element = vec![0; loaded.mesh.n_elements()];
     fem::assemble_stiffness(
-        &loaded.mesh,
+        loaded.solved_mesh(),
         std::slice::from_ref(&loaded.spec.material),
         &of_element,
         loaded.spec.quadrature,
@@ -440,20 +447,26 @@ fn build(loaded: &LoadedPart, ui: &Ui<'_>) -> Result<Built, Error> {
     };
     let stiffness = assemble(loaded)?;
     done("assemble the stiffness", &mut seconds);
-    let ordered = OrderedStiffness::new(&stiffness, &loaded.supports, &progress)
+    let ordered = OrderedStiffness::new(&stiffness, loaded.solved_supports(), &progress)
         .map_err(|e| Error::part(path, e))?;
     done("order the unknowns", &mut seconds);
     let factor = ordered
         .factor(&progress)
         .map_err(|e| Error::part(path, e))?;
     done("factor", &mut seconds);
-    let compliance = Compliance::build(&factor, &loaded.candidates, &loaded.rows, &progress)
+    let (candidates, rows) = (
+        loaded.solved_nodes(&loaded.candidates),
+        loaded.solved_nodes(&loaded.rows),
+    );
+    let mut compliance = Compliance::build(&factor, &candidates, &rows, &progress)
         .map_err(|e| Error::part(path, e))?;
     done("compliance columns", &mut seconds);
     let checks = compliance
         .check(&stiffness, &factor)
         .map_err(|e| Error::part(path, e))?;
     done("checks", &mut seconds);
+    compliance.candidates.clone_from(&loaded.candidates);
+    compliance.rows.clone_from(&loaded.rows);
     Ok((compliance, checks, seconds))
 }
 
@@ -471,6 +484,7 @@ fn cache_key(loaded: &LoadedPart) -> [u8; 32] {
     }
     hash.update(format!("{:?}", loaded.spec.quadrature).as_bytes());
     hash.update(&[loaded.mesh.order as u8, loaded.spec.refinements]);
+    hash.update(&[loaded.solved_mesh().order as u8]);
     for dof in 0..3 * loaded.mesh.n_nodes() {
         hash.update(&[u8::from(loaded.supports.is_fixed(dof))]);
     }

@@ -198,6 +198,8 @@ pub struct Part {
     pub other_meshes: Vec<PathBuf>,
     /// Element order that is asked for, 1, 2 or 3; `None`: the mesh's own.
     pub order: Option<u8>,
+    /// Order of the elements inside, 1 to 5; `None`: that of the surface.
+    pub interior_order: Option<u8>,
     /// Linear elasticity and limits.
     pub material: Material,
     /// Held groups; never empty.

@@ -42,6 +42,7 @@ pub fn part_spec(scene: &Scene) -> Result<PartSpec, Error> {
         mesh_path: scene.part.mesh.clone(),
         length_scale: scene.length_scale,
         order: scene.part.order,
+        interior_order: scene.part.interior_order,
         refinements: 0,
         bubbles: match scene.accuracy.adaptive {
             Adaptive::On {

@@ -1,6 +1,6 @@
 //! Consistent nodal forces of loads on faces.
 
-use crate::element::{Order, face_shape};
+use crate::element::{MAX_FACE_NODES, Order, face_shape};
 use crate::mesh::{Group, Mesh};
 use crate::{Error, quadrature};
 
@@ -102,12 +102,14 @@ fn integrate_faces(
         Order::Linear => 2,
         Order::Quadratic => 8,
         Order::Cubic => 12,
+        Order::Quartic => 16,
+        Order::Quintic => 20,
     };
     let rule = quadrature::triangle(degree);
     let n = mesh.order.nodes_per_face();
     for (f, face) in group.faces.iter().enumerate() {
         for point in &rule {
-            let (mut values, mut d) = ([0.0; 10], [[0.0; 3]; 10]);
+            let (mut values, mut d) = ([0.0; MAX_FACE_NODES], [[0.0; 3]; MAX_FACE_NODES]);
             face_shape(mesh.order, point.coordinates, &mut values, &mut d);
             let (mut along, mut across) = ([0.0; 3], [0.0; 3]);
             for (&node, d) in face.nodes.iter().zip(&d[..n]) {

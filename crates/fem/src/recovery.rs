@@ -5,7 +5,7 @@
 //! the strains at the Gauss points of the elements around it, by least squares, and takes its value at the surface:
 //!
 //! ```text
-//! P_v(x) = m(x)ᵀ a_v        m: all monomials up to degree p      a_v: min Σ_k |P_v(x_k) - ε_h(x_k)|²
+//! P_v(x) = m(x)ᵀ a_v        m: all monomials up to degree p, 3 at most      a_v: min Σ_k |P_v(x_k) - ε_h(x_k)|²
 //! ε*(x)  = Σ_v L_v(x) P_v(x)        on a face with vertices v and barycentric coordinates L_v
 //! ```
 //!
@@ -24,7 +24,7 @@ mod patch;
 
 use rayon::prelude::*;
 
-use crate::element::{MAX_NODES, Order};
+use crate::element::{MAX_FACE_NODES, MAX_NODES, Order};
 use crate::mesh::{Face, Mesh};
 use crate::quadrature;
 use crate::stress::{Tensor, displacement_gradient, largest_principal, strain};
@@ -208,7 +208,7 @@ impl RecoveredStrain<'_> {
     pub fn on_face(&self, face: usize, l: [f64; 3]) -> Tensor {
         let recovery = self.recovery;
         let nodes = &recovery.faces[face].nodes;
-        let (mut n, mut d) = ([0.0; 10], [[0.0; 3]; 10]);
+        let (mut n, mut d) = ([0.0; MAX_FACE_NODES], [[0.0; 3]; MAX_FACE_NODES]);
         crate::element::face_shape(recovery.mesh.order, l, &mut n, &mut d);
         let x = std::array::from_fn(|c| {
             let along = nodes.iter().zip(&n);

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::element::{Order, face_shape};
+use crate::element::{MAX_FACE_NODES, Order, face_shape};
 use crate::mesh::{Face, Mesh};
 
 /// An edge of the skin, between two of its faces.
@@ -85,7 +85,7 @@ fn turn(mesh: &Mesh, faces: &[Face], first: (u32, u8), second: (u32, u8)) -> f64
 
 /// dx/dL_1 and dx/dL_2 with L_0 = 1 - L_1 - L_2.
 fn tangents(mesh: &Mesh, face: &Face, l: [f64; 3]) -> [[f64; 3]; 2] {
-    let (mut n, mut d) = ([0.0; 10], [[0.0; 3]; 10]);
+    let (mut n, mut d) = ([0.0; MAX_FACE_NODES], [[0.0; 3]; MAX_FACE_NODES]);
     face_shape(mesh.order, l, &mut n, &mut d);
     [1, 2].map(|k| {
         [0, 1, 2].map(|c| {

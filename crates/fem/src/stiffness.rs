@@ -114,8 +114,8 @@ impl ElementRule {
     pub(crate) fn stiffness(&self, x: &[[f64; 3]; MAX_NODES], material: &Material, k: &mut [f64]) {
         let n = self.order.nodes_per_element();
         let size = 3 * n;
-        let mut memory = [0.0; MAX_SIZE * MAX_SIZE];
-        let s = &mut memory[..size * size];
+        let mut memory = vec![0.0; size * size];
+        let s = memory.as_mut_slice();
         self.gradient_products(&x[..n], s);
         let (lambda, mu) = (material.lame_lambda(), material.shear_modulus());
         for a in 0..n {
@@ -148,8 +148,8 @@ impl ElementRule {
         if self.is_straight(x) {
             return straight.gradient_products(x, s);
         }
-        let mut memory = [0.0; MAX_SIZE * MAX_SIZE];
-        let coarser = &mut memory[..s.len()];
+        let mut memory = vec![0.0; s.len()];
+        let coarser = memory.as_mut_slice();
         for (step, (points, degree)) in ladder.iter().zip(LADDER).enumerate() {
             coarser.copy_from_slice(s);
             points

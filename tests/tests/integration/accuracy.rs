@@ -290,7 +290,9 @@ fn a_folder_with_other_files_and_an_unknown_choice_are_refused() {
     let unknown = accuracy(&dir.path().join("out"), &["--axes", "speed"]);
     assert_eq!(unknown.code, 2);
     assert!(
-        unknown.err.contains("there are order, mesh, planes"),
+        unknown
+            .err
+            .contains("there are order, interior, mesh, planes"),
         "{}",
         unknown.err
     );

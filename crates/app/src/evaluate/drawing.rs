@@ -7,10 +7,10 @@ use glam::DVec3;
 
 use crate::report::{CellKind, PartDrawing};
 
-/// Triangles of a face in its local nodes: 1, 4 or 9.
+/// Triangles of a face in its local nodes: 1, 4 or 9. Orders above 3 are of the inside and never drawn: by vertices.
 fn split(order: Order) -> &'static [[usize; 3]] {
     match order {
-        Order::Linear => &[[0, 1, 2]],
+        Order::Linear | Order::Quartic | Order::Quintic => &[[0, 1, 2]],
         Order::Quadratic => &[[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]],
         Order::Cubic => &[
             [0, 3, 8],
@@ -29,7 +29,7 @@ fn split(order: Order) -> &'static [[usize; 3]] {
 /// Edges of a face as polylines of its local nodes.
 fn edges(order: Order) -> &'static [&'static [usize]] {
     match order {
-        Order::Linear => &[&[0, 1], &[1, 2], &[2, 0]],
+        Order::Linear | Order::Quartic | Order::Quintic => &[&[0, 1], &[1, 2], &[2, 0]],
         Order::Quadratic => &[&[0, 3, 1], &[1, 4, 2], &[2, 5, 0]],
         Order::Cubic => &[&[0, 3, 4, 1], &[1, 5, 6, 2], &[2, 7, 8, 0]],
     }
@@ -46,7 +46,7 @@ pub(super) fn part(mesh: &Mesh) -> PartDrawing {
         edges: surface_edges(mesh.order, &faces),
         cells: mesh.elements.clone(),
         cell_kind: match mesh.order {
-            Order::Linear => CellKind::Tet4,
+            Order::Linear | Order::Quartic | Order::Quintic => CellKind::Tet4,
             Order::Quadratic => CellKind::Tet10,
             Order::Cubic => CellKind::Tet20,
         },

@@ -19,6 +19,8 @@ pub(crate) struct StrainReader<'a> {
     loaded: &'a LoadedPart,
     recovery: Recovery<'a>,
     marks: Marks,
+    /// By node of the mesh that is solved on: the part's node, where that mesh is another.
+    part_nodes: Option<Vec<Option<u32>>>,
 }
 
 /// Largest strain of each kind of place, so far.
@@ -40,23 +42,33 @@ pub(crate) struct Moment<'m> {
 
 impl<'a> StrainReader<'a> {
     pub(crate) fn new(loaded: &'a LoadedPart) -> Self {
-        let recovery = Recovery::new(&loaded.mesh);
-        let marks = Marks::of(&loaded.mesh, &loaded.supports, recovery.faces());
+        let mesh = loaded.solved_mesh();
+        let recovery = Recovery::new(mesh);
+        let marks = Marks::of(mesh, loaded.solved_supports(), recovery.faces());
         Self {
+            part_nodes: loaded.interior.as_ref().map(|i| i.surface_nodes()),
             loaded,
             recovery,
             marks,
         }
     }
 
-    /// The largest strain of each kind of place under a displacement (3 node + component, m).
+    /// The part's node at a node of the mesh that is solved on.
+    fn part_node(&self, solved: u32) -> Option<u32> {
+        match &self.part_nodes {
+            None => Some(solved),
+            Some(nodes) => nodes[solved as usize],
+        }
+    }
+
+    /// The largest strain of each kind of place under a displacement of the mesh that is solved on (3 node + component,
+    /// m), at the part's nodes.
     pub(crate) fn peaks(&self, u: &[f64], moment: &Moment<'_>) -> StrainPeaks {
         let strain = self.recovery.strain(u);
-        let mut is_near = vec![false; self.loaded.mesh.n_nodes()];
-        moment
-            .contacts
-            .iter()
-            .for_each(|&n| is_near[n as usize] = true);
+        let mut is_near = vec![false; self.loaded.solved_mesh().n_nodes()];
+        for &node in &*self.loaded.solved_nodes(moment.contacts) {
+            is_near[node as usize] = true;
+        }
         // A node between two vertices has few faces of its own, hence twice.
         let is_near = widened(
             self.recovery.faces(),
@@ -69,6 +81,9 @@ impl<'a> StrainReader<'a> {
             .zip(self.recovery.nodes())
             .enumerate()
         {
+            if self.part_node(node).is_none() {
+                continue;
+            }
             let kind = self.kind(node as usize, &is_near);
             let value = largest_principal(tensor);
             let best = &mut best[kind as usize];
@@ -78,7 +93,7 @@ impl<'a> StrainReader<'a> {
         }
         let peaks = PeakKind::ALL.into_iter().filter_map(|kind| {
             let (value, i) = best[kind as usize]?;
-            let node = self.recovery.nodes()[i] as usize;
+            let node = self.part_node(self.recovery.nodes()[i])? as usize;
             Some(StrainPeak {
                 value,
                 error: strain.error_around(i),
@@ -108,7 +123,7 @@ impl<'a> StrainReader<'a> {
 
     /// Largest principal strain by size at every node of the skin, for pictures; not a number inside.
     pub(crate) fn principal(&self, u: &[f64]) -> Vec<f64> {
-        let mut values = vec![f64::NAN; self.loaded.mesh.n_nodes()];
+        let mut values = vec![f64::NAN; self.loaded.solved_mesh().n_nodes()];
         let strain = self.recovery.strain(u);
         for (tensor, &node) in strain.at_nodes().iter().zip(self.recovery.nodes()) {
             values[node as usize] = largest_principal(tensor);
@@ -178,7 +193,7 @@ impl Story<'_> {
             let record = &recording.records[index];
             let u = solver.displacement(recording, record);
             max_rotation = max_rotation.max(solver.extremes(&u).max_rotation);
-            also(&u, record);
+            also(u.at_nodes(), record);
             let loaded = &self.prepared.loaded;
             let contacts: Vec<u32> = recording
                 .contacts(record)

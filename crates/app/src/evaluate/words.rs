@@ -112,10 +112,7 @@ impl Story<'_> {
         settings.extend(self.hand_settings());
         settings.extend([
             pair("accuracy", scene.accuracy.words()),
-            pair(
-                "elements",
-                format!("order {}", self.prepared.loaded.mesh.order),
-            ),
+            pair("elements", self.order_words()),
             pair("compliance", self.compliance_words()),
         ]);
         if let Some(felt) = &self.felt {
@@ -123,6 +120,20 @@ impl Story<'_> {
             settings.push(pair("multiply", felt.shape.choice().words_in_full()));
         }
         settings
+    }
+
+    /// Of the elements.
+    fn order_words(&self) -> String {
+        let loaded = &self.prepared.loaded;
+        match &loaded.interior {
+            None => format!("order {}", loaded.mesh.order),
+            Some(interior) => format!(
+                "order {}, solved with order {} inside ({} nodes)",
+                loaded.mesh.order,
+                interior.mesh.order,
+                interior.mesh.n_nodes()
+            ),
+        }
     }
 
     /// Which body, and where it is held in its own frame.

@@ -55,10 +55,11 @@ pub(super) fn checked(
     peak: f64,
     options: &PrepareOptions,
 ) -> Result<Option<Warning>, Error> {
-    let order = prepared.loaded.mesh.order;
+    // What bends is what is solved on.
+    let order = prepared.loaded.solved_mesh().order;
     let nu = scene.part.material.poisson_ratio;
     let may_lock = nu > NEARLY_INCOMPRESSIBLE;
-    if order == Order::Cubic && !may_lock {
+    if order >= Order::Cubic && !may_lock {
         return Ok(None);
     }
     let affordable = if order == Order::Linear || may_lock {
@@ -87,6 +88,7 @@ pub(super) fn checked(
         }
         Order::Quadratic if may_lock => of_quadratic(nu, peak, &at(HIGHEST)?),
         Order::Quadratic => of_coarse(peak, &at(HIGHEST)?),
+        Order::Quartic | Order::Quintic => None,
         Order::Cubic => of_cubic(nu, peak, &at(2)?, &at(1)?),
     })
 }
@@ -101,6 +103,7 @@ fn peak_at(
 ) -> Result<Peak, Error> {
     let mut scene = scene.clone();
     scene.part.order = Some(order);
+    scene.part.interior_order = None;
     scene.accuracy.budget_us = None;
     scene.drive.retract = false;
     let spec = setup::part_spec(&scene)?;

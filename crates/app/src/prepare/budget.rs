@@ -33,7 +33,7 @@ impl Forecast {
     /// its work like n^1.9 (n: free unknowns); the constants were fitted to tetrahedral parts of
     /// 2 000 to 70 000 unknowns prepared with this program; a column touches half the factor or less.
     pub fn of(loaded: &LoadedPart) -> Self {
-        let n = 3.0 * loaded.mesh.n_nodes() as f64;
+        let n = 3.0 * loaded.solved_mesh().n_nodes() as f64;
         let columns = 3.0 * loaded.candidates.len() as f64;
         let factor_entries = 5.0 * n.powf(1.35);
         Self {
@@ -51,10 +51,17 @@ impl Forecast {
     /// The forecast in one line.
     pub fn line(&self, loaded: &LoadedPart) -> String {
         format!(
-            "preparing {}: {} nodes, {} elements, {} nodes can touch, {} on the surface; \
-             expects {} of memory and about {}",
+            "preparing {}: {} nodes{}, {} elements, {} nodes can touch, {} on the surface; expects {} of memory and about {}",
             loaded.spec.mesh_path.display(),
             loaded.mesh.n_nodes(),
+            loaded
+                .interior
+                .as_ref()
+                .map_or_else(String::new, |interior| format!(
+                    " ({} at order {} inside)",
+                    interior.mesh.n_nodes(),
+                    interior.mesh.order
+                )),
             loaded.mesh.n_elements(),
             loaded.candidates.len(),
             loaded.rows.len(),
@@ -189,6 +196,7 @@ mod tests {
             place: "clip.toml:1".to_owned(),
         };
         load(&PartSpec {
+            interior_order: None,
             mesh_path: std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
                 .join("../../scenes/clip.msh"),
             length_scale: 1.0,

@@ -31,6 +31,7 @@ const BATCH: usize = 64;
 #[derive(Debug)]
 pub struct Demand {
     factor: FactoredStiffness,
+    /// Nodes of the mesh that is solved on.
     candidates: Vec<u32>,
     rows: Vec<u32>,
     part: Arc<ContactPart>,
@@ -62,8 +63,8 @@ impl Demand {
         let seeds = spread(&rest, SEEDS.min(capacity));
         let demand = Self {
             factor,
-            candidates: loaded.candidates.clone(),
-            rows: loaded.rows.clone(),
+            candidates: loaded.solved_nodes(&loaded.candidates).into_owned(),
+            rows: loaded.solved_nodes(&loaded.rows).into_owned(),
             part: Arc::new(ContactPart::with_fetched_and_held(
                 rest,
                 &loaded.held_positions(),

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use fem::{Mesh, Order, Supports};
 
+use super::interior::Interior;
 use super::{GroupRef, LoadedPart, PartSpec};
 use crate::Error;
 
@@ -26,12 +27,7 @@ pub fn load(spec: &PartSpec) -> Result<LoadedPart, Error> {
     if let Some(order) = spec.order.and_then(Order::try_from_number) {
         mesh = mesh.with_order(order).map_err(|e| Error::part(path, e))?;
     }
-    let mut supports = Supports::new(mesh.n_nodes());
-    for (name, components) in &spec.fixed {
-        for &node in &group(&mesh, name, path, "fixed")?.nodes {
-            supports.fix_node(node, *components);
-        }
-    }
+    let supports = held(&mesh, spec)?;
     let mut warnings = mesh.check(&supports).map_err(|e| Error::part(path, e))?;
     let Touchable { candidates, held } = touchable(&mesh, spec, &supports, &mut warnings)?;
     let mut can_touch = vec![false; mesh.n_nodes()];
@@ -44,8 +40,10 @@ pub fn load(spec: &PartSpec) -> Result<LoadedPart, Error> {
             .into_iter()
             .filter(|&node| !can_touch[node as usize]),
     );
+    let interior = Interior::of(&mesh, spec)?;
     Ok(LoadedPart {
         spec: spec.clone(),
+        interior,
         mesh,
         supports,
         candidates,
@@ -54,6 +52,17 @@ pub fn load(spec: &PartSpec) -> Result<LoadedPart, Error> {
         warnings,
         mesh_hash,
     })
+}
+
+/// The held degrees of freedom of a mesh of the part.
+pub(super) fn held(mesh: &Mesh, spec: &PartSpec) -> Result<Supports, Error> {
+    let mut supports = Supports::new(mesh.n_nodes());
+    for (name, components) in &spec.fixed {
+        for &node in &group(mesh, name, &spec.mesh_path, "fixed")?.nodes {
+            supports.fix_node(node, *components);
+        }
+    }
+    Ok(supports)
 }
 
 /// Nodes of the contact groups, ascending.

@@ -208,6 +208,11 @@ impl Check<'_> {
     fn part(&self, raw: raw::PartRaw, accuracy: &raw::AccuracyKeys) -> Result<Part, SceneError> {
         let mend = "paths are relative to the scene file; scenes/README.md shows how to make one";
         let order = self.order(accuracy.order.as_ref(), raw.order.as_ref(), accuracy.preset)?;
+        let interior_order = raw.interior_order.as_ref();
+        let interior_order = interior_order
+            .map(|at| self.integer("interior_order", at, 1, 5))
+            .transpose()?
+            .map(|order| order as u8);
         let none = |key: &str, offset| {
             self.error(
                 offset,
@@ -259,6 +264,7 @@ impl Check<'_> {
                 names.map(|name| folder.join(name)).collect()
             },
             order,
+            interior_order,
             material,
             fixed,
             contact,

@@ -374,7 +374,7 @@ impl Runner<'_, '_> {
             setting.scene.accuracy.multiply = Multiply::Cpu;
             point::set_accuracy(&mut setting.scene, Accuracy::of(Some(Preset::Exact)));
             setting.scene.accuracy.preset = None;
-            setting.scene.part.order = Some(order);
+            point::set_order(&mut setting.scene, order);
             setting.refinements = refinements;
             setting
         };

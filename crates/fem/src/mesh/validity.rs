@@ -26,16 +26,11 @@ impl Mesh {
         let x = self.element_coordinates(element);
         match self.order {
             Order::Linear => determinant(&crate::geometry::jacobian(&linear_derivatives(), &x)),
-            Order::Quadratic => {
-                static BASIS: OnceLock<Bernstein> = OnceLock::new();
-                BASIS
-                    .get_or_init(|| Bernstein::new(Order::Quadratic))
-                    .lower_bound(&x)
-            }
-            Order::Cubic => {
-                static BASIS: OnceLock<Bernstein> = OnceLock::new();
-                BASIS
-                    .get_or_init(|| Bernstein::new(Order::Cubic))
+            order => {
+                static BASES: [OnceLock<Bernstein>; Order::HIGHEST as usize + 1] =
+                    [const { OnceLock::new() }; Order::HIGHEST as usize + 1];
+                BASES[order as usize]
+                    .get_or_init(|| Bernstein::new(order))
                     .lower_bound(&x)
             }
         }

@@ -18,7 +18,10 @@ const MOST_AMPLIFIED: f64 = 1.0;
 /// has 2.
 const MOST_AMPLIFIED_ALONE: f64 = 4.0;
 
-/// Highest degree is 3: 20 monomials.
+/// Highest degree of a fit, also of elements of higher order.
+const HIGHEST: u32 = 3;
+
+/// Monomials of [`HIGHEST`].
 const MOST_TERMS: usize = 20;
 
 /// Elements at each vertex and across each face.
@@ -99,7 +102,8 @@ impl Patch {
         per_element: usize,
     ) -> Self {
         let at = mesh.nodes[vertex as usize];
-        for degree in (1..=mesh.order as u32).rev() {
+        let highest = (mesh.order as u32).min(HIGHEST);
+        for degree in (1..=highest).rev() {
             let mut elements = neighbours.at(vertex).to_vec();
             for layer in 0..=MOST_LAYERS {
                 if layer > 0 {
@@ -109,7 +113,7 @@ impl Patch {
                         break;
                     }
                 }
-                let most = if degree == mesh.order as u32 {
+                let most = if degree == highest {
                     MOST_AMPLIFIED
                 } else {
                     MOST_AMPLIFIED_ALONE

@@ -3,9 +3,20 @@
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
+use fem::element::MAX_NODES;
 use fem::{Group, Material, Mesh, Order, Quadrature, Stiffness, Supports};
 
+/// Of mesh files.
 pub(crate) const ORDERS: [Order; 3] = [Order::Linear, Order::Quadratic, Order::Cubic];
+
+/// Those of the inside of a part too.
+pub(crate) const ALL_ORDERS: [Order; 5] = [
+    Order::Linear,
+    Order::Quadratic,
+    Order::Cubic,
+    Order::Quartic,
+    Order::Quintic,
+];
 
 pub(crate) fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -165,7 +176,7 @@ pub(crate) fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
 
 /// Where a local point of an element is.
 pub(crate) fn place(mesh: &Mesh, element: usize, l: [f64; 4]) -> [f64; 3] {
-    let (mut n, mut d) = ([0.0; 20], [[0.0; 4]; 20]);
+    let (mut n, mut d) = ([0.0; MAX_NODES], [[0.0; 4]; MAX_NODES]);
     mesh.order.shape(l, &mut n, &mut d);
     std::array::from_fn(|c| {
         mesh.element_nodes(element)
@@ -187,7 +198,7 @@ pub(crate) fn area(mesh: &Mesh, name: &str) -> f64 {
             for (v, x) in fem::element::FACE_VERTICES[0].into_iter().zip(l) {
                 full[v] = x;
             }
-            let (mut n, mut d) = ([0.0; 20], [[0.0; 4]; 20]);
+            let (mut n, mut d) = ([0.0; MAX_NODES], [[0.0; 4]; MAX_NODES]);
             order.shape(full, &mut n, &mut d);
             local.iter().map(|&i| n[i]).collect::<Vec<f64>>()
         };

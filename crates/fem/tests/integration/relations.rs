@@ -201,7 +201,7 @@ fn loads_on_a_straight_face_have_the_shares_of_the_book() {
                 (Order::Quadratic, _) => 1.0 / 3.0,
                 (Order::Cubic, 0..3) => 1.0 / 30.0,
                 (Order::Cubic, 3..9) => 3.0 / 40.0,
-                (Order::Cubic, _) => 9.0 / 20.0,
+                (_, _) => 9.0 / 20.0,
             };
             let found = &force[3 * node as usize..][..3];
             // Pressure pushes into the body: along -x on the face x = 1.

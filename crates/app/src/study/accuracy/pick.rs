@@ -3,7 +3,7 @@
 use super::busy::Repeats;
 use super::compare::{Scales, distance};
 use super::measure::{Course, Samples, measure, ready};
-use super::point::{Setting, base, set_accuracy};
+use super::point::{Setting, base, set_accuracy, set_order};
 use crate::Error;
 use crate::prepare::PrepareOptions;
 use crate::progress::Ui;
@@ -113,7 +113,7 @@ fn ladder(scene: &Scene) -> Vec<(String, Setting)> {
             };
             set_accuracy(&mut setting.scene, Accuracy::of(preset));
             setting.scene.accuracy.preset = None;
-            setting.scene.part.order = Some(order);
+            set_order(&mut setting.scene, order);
             // The budget is that of the step, which the display's multiply is no part of.
             setting.scene.accuracy.multiply = Multiply::Cpu;
             let planes = match times {

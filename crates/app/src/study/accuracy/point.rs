@@ -14,6 +14,8 @@ use crate::scene::{
 pub enum Axis {
     /// Order of the elements.
     Order,
+    /// Order of the elements inside.
+    Interior,
     /// Mesh of the scene, others, and the scene's refined.
     Mesh,
     /// Passes over the contact planes.
@@ -42,8 +44,9 @@ pub enum Axis {
 
 impl Axis {
     /// All, in the order of the tables.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::Order,
+        Self::Interior,
         Self::Mesh,
         Self::Planes,
         Self::Select,
@@ -62,6 +65,7 @@ impl Axis {
     pub fn name(self) -> &'static str {
         match self {
             Self::Order => "order",
+            Self::Interior => "interior",
             Self::Mesh => "mesh",
             Self::Planes => "planes",
             Self::Select => "select",
@@ -81,6 +85,7 @@ impl Axis {
     pub fn title(self) -> &'static str {
         match self {
             Self::Order => "order of the elements",
+            Self::Interior => "order inside (surface and contact as they are)",
             Self::Mesh => "mesh",
             Self::Planes => "passes over the contact planes",
             Self::Select => "p-method: select (free nodes drawn)",
@@ -126,10 +131,11 @@ impl Setting {
             _ => String::new(),
         };
         format!(
-            "{} refined {} order {:?} {:?} {accuracy:?}{on_adapter}",
+            "{} refined {} order {:?} inside {:?} {:?} {accuracy:?}{on_adapter}",
             self.scene.part.mesh.display(),
             self.refinements,
             self.scene.part.order,
+            self.scene.part.interior_order,
             self.scene.part.quadrature,
         )
     }
@@ -147,10 +153,11 @@ impl Setting {
             _ => String::new(),
         };
         format!(
-            "{} refined {} order {:?} {:?} {bubbles}",
+            "{} refined {} order {:?} inside {:?} {:?} {bubbles}",
             part.mesh.display(),
             self.refinements,
             part.order,
+            part.interior_order,
             part.quadrature
         )
     }
@@ -191,6 +198,12 @@ pub(super) fn multiply_written(scene: &mut Scene) {
     };
 }
 
+/// Another order throughout.
+pub(super) fn set_order(scene: &mut Scene, order: u8) {
+    scene.part.order = Some(order);
+    scene.part.interior_order = None;
+}
+
 /// All points of the axes asked for. `own_order`: that of the mesh; `extent`: size of the part, m; `adapter`: see
 /// [`base`].
 pub(super) fn points(
@@ -217,7 +230,17 @@ pub(super) fn points(
             Axis::Order => {
                 for order in 1..=3u8 {
                     add(format!("order {order}"), &|s| {
-                        s.scene.part.order = Some(order);
+                        set_order(&mut s.scene, order);
+                    });
+                }
+            }
+            Axis::Interior => {
+                add(format!("order {own} throughout"), &|s| {
+                    s.scene.part.interior_order = None;
+                });
+                for order in (own + 1..=5).filter(|order| order.is_multiple_of(own)) {
+                    add(format!("order {order} inside"), &|s| {
+                        s.scene.part.interior_order = Some(order);
                     });
                 }
             }
@@ -276,6 +299,7 @@ pub(super) fn points(
                             free: FreeNodes::Radius(radius),
                         };
                         s.scene.accuracy.multiply = Multiply::Cpu;
+                        s.scene.part.interior_order = None;
                     });
                 }
                 add("all free".to_owned(), &|s| {
@@ -364,7 +388,7 @@ pub(super) fn points(
                     add(preset.name().to_owned(), &|s| {
                         set_accuracy(&mut s.scene, Accuracy::of(Some(preset)));
                         if preset == Preset::Exact {
-                            s.scene.part.order = Some(3);
+                            set_order(&mut s.scene, 3);
                         }
                     });
                 }

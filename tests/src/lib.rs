@@ -4,6 +4,11 @@ pub mod brick;
 
 use std::path::{Path, PathBuf};
 
+use snapin::prepare::{PrepareOptions, PreparedPart, prepare};
+use snapin::progress::Ui;
+use snapin::scene::Scene;
+use snapin::setup;
+
 /// Root of the checkout.
 pub fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
@@ -36,6 +41,23 @@ pub fn snapin(args: &[&str]) -> Outcome {
 pub fn arg(path: &Path) -> &str {
     path.to_str()
         .unwrap_or_else(|| panic!("test paths are UTF-8: {}", path.display()))
+}
+
+/// A scene's part, prepared without a cache.
+pub fn prepared(scene: &Scene) -> PreparedPart {
+    let mut unseen = std::io::sink();
+    let ui = Ui::new(&mut unseen, false);
+    setup::part_spec(scene)
+        .and_then(|spec| prepare(&spec, &PrepareOptions::default(), &ui))
+        .unwrap_or_else(|e| panic!("{}: {e}", scene.path.display()))
+}
+
+/// A shipped scene and its part.
+pub fn shipped(name: &str) -> (Scene, PreparedPart) {
+    let path = root().join("scenes").join(name);
+    let scene = Scene::load(&path).unwrap_or_else(|e| panic!("{e}"));
+    let part = prepared(&scene);
+    (scene, part)
 }
 
 /// Columns of a CSV file with a header line, by name.

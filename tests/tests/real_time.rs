@@ -11,14 +11,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use device::Wrench;
 use glamx::DPose3;
 use snapin::engine::StepReport;
-use snapin::prepare::{PrepareOptions, prepare};
-use snapin::progress::Ui;
 use snapin::scene::{Adaptive, Columns, FreeNodes, Multiply, PMethod, Scalar, Scene};
 use snapin::session::fast::FastSettings;
 use snapin::session::slow::Stepped;
 use snapin::setup;
 use snapin::shape::Shape;
-use snapin_tests::root;
+use snapin_tests::{root, shipped};
 
 struct Counting;
 
@@ -89,14 +87,7 @@ fn no_step_of_an_insertion_allocates() {
         if let Some(rows) = rows {
             scene.accuracy.max_contacts = rows;
         }
-        let mut unseen = std::io::sink();
-        let ui = Ui::new(&mut unseen, false);
-        let prepared = prepare(
-            &setup::part_spec(&scene).unwrap(),
-            &PrepareOptions::default(),
-            &ui,
-        )
-        .unwrap();
+        let prepared = snapin_tests::prepared(&scene);
         let (tool, _) = setup::tool(&scene).unwrap();
         let mut engine = setup::engine(&scene, &prepared, tool).unwrap();
         let mut shape = Shape::new(&prepared, &scene.accuracy, None).unwrap();
@@ -134,11 +125,7 @@ fn no_step_of_an_insertion_allocates() {
 
 /// The fast loop of two rates, with the engine's work in turns: solving, hand-overs and freezing take no memory.
 fn no_tick_of_two_rates_allocates() {
-    let scene = Scene::load(&root().join("scenes/clip.toml")).unwrap();
-    let mut unseen = std::io::sink();
-    let ui = Ui::new(&mut unseen, false);
-    let spec = setup::part_spec(&scene).unwrap();
-    let prepared = prepare(&spec, &PrepareOptions::default(), &ui).unwrap();
+    let (scene, prepared) = shipped("clip.toml");
     let (tool, _) = setup::tool(&scene).unwrap();
     let mut engine = setup::engine(&scene, &prepared, tool).unwrap();
     let start = scene.tool.pose_part_tool;

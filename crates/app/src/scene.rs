@@ -33,6 +33,7 @@ pub use accuracy::{
 };
 pub use error::SceneError;
 pub use handbook::Handbook;
+use units::Quantity;
 
 /// A validated scene. Lengths in m, forces in N, times in s, whatever the file's units.
 ///
@@ -79,44 +80,32 @@ pub struct Scene {
 
 impl Scene {
     /// A stiffness (N/m) in the scene's unit, with it, as the scene would have to say it.
-    pub fn stiffness_words(&self, newtons_per_metre: f64) -> String {
-        self.in_units("stiffness", units::Quantity::Stiffness, newtons_per_metre)
+    pub(crate) fn stiffness_words(&self, si: f64) -> String {
+        self.in_units(Quantity::Stiffness, si)
     }
 
     /// A mass (kg), likewise.
-    pub fn mass_words(&self, kilograms: f64) -> String {
-        self.in_units("mass", units::Quantity::Mass, kilograms)
+    pub(crate) fn mass_words(&self, si: f64) -> String {
+        self.in_units(Quantity::Mass, si)
     }
 
     /// A damping (N s/m), likewise.
-    pub fn damping_words(&self, newton_seconds_per_metre: f64) -> String {
-        self.in_units(
-            "damping",
-            units::Quantity::Damping,
-            newton_seconds_per_metre,
-        )
+    pub(crate) fn damping_words(&self, si: f64) -> String {
+        self.in_units(Quantity::Damping, si)
     }
 
     /// A pressure (Pa), likewise.
-    pub fn pressure_words(&self, pascals: f64) -> String {
-        self.in_units("pressure", units::Quantity::Pressure, pascals)
+    pub(crate) fn pressure_words(&self, si: f64) -> String {
+        self.in_units(Quantity::Pressure, si)
     }
 
     /// A rotational stiffness (N m/rad), likewise.
-    pub fn rotational_stiffness_words(&self, newton_metres: f64) -> String {
-        self.in_units(
-            "rotational_stiffness",
-            units::Quantity::RotationalStiffness,
-            newton_metres,
-        )
+    pub(crate) fn rotational_stiffness_words(&self, si: f64) -> String {
+        self.in_units(Quantity::RotationalStiffness, si)
     }
 
-    fn in_units(&self, name: &str, quantity: units::Quantity, si: f64) -> String {
-        let (of_si, of_mm) = units::labels(name).unwrap_or_default();
-        let unit = match self.units {
-            Units::Si => of_si,
-            Units::MmNMpa => of_mm,
-        };
+    fn in_units(&self, quantity: Quantity, si: f64) -> String {
+        let unit = units::label(self.units, quantity);
         // Nine digits: what a scene says in mm is the same again.
         let value = si / units::to_si(self.units, quantity);
         let value = format!("{value:.8e}").parse().unwrap_or(value);

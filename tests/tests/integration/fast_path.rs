@@ -13,8 +13,6 @@ use device::VirtualCoupling;
 use glam::{DMat3, DQuat, DVec3};
 use glamx::DPose3;
 use snapin::engine::{ContactPart, Engine};
-use snapin::prepare::{PrepareOptions, prepare};
-use snapin::progress::Ui;
 use snapin::scene::Scene;
 use snapin::setup;
 use snapin_tests::root;
@@ -351,10 +349,7 @@ fn numbers() -> impl FnMut() -> f64 {
 /// Pushes the tool in and out at random along the scene's way, with some play to the sides and in turning.
 fn compare(name: &str, as_mesh: bool, deepest: f64) {
     let scene = Scene::load(&root().join("scenes").join(name)).unwrap();
-    let mut unseen = std::io::sink();
-    let spec = setup::part_spec(&scene).unwrap();
-    let ui = Ui::new(&mut unseen, false);
-    let prepared = prepare(&spec, &PrepareOptions::default(), &ui).unwrap();
+    let prepared = snapin_tests::prepared(&scene);
     let (mut tool, _) = setup::tool(&scene).unwrap();
     if as_mesh {
         let (vertices, triangles) = tool.tessellate(0.02);

@@ -5,19 +5,8 @@
 //! 2⁻¹¹ for each of the terms, which have one sign here at most places: 1e-3.
 
 use gpu::{Adapters, ComplianceMultiply, Gpu, GpuSettings, Layout, Scalar, Storage, on_cpu};
-use snapin::prepare::{PrepareOptions, PreparedCompliance, PreparedPart, prepare};
-use snapin::progress::Ui;
-use snapin::scene::Scene;
-use snapin::setup;
-use snapin_tests::root;
-
-fn prepared(scene: &str) -> PreparedPart {
-    let scene = Scene::load(&root().join("scenes").join(scene)).unwrap();
-    let mut unseen = std::io::sink();
-    let ui = Ui::new(&mut unseen, false);
-    let spec = setup::part_spec(&scene).unwrap();
-    prepare(&spec, &PrepareOptions::default(), &ui).unwrap()
-}
+use snapin::prepare::PreparedCompliance;
+use snapin_tests::shipped;
 
 /// Largest difference, of the largest displacement.
 fn difference(found: &[f64], expected: &[f64]) -> f64 {
@@ -42,7 +31,7 @@ fn compliances_of_the_shipped_parts_agree_on_every_adapter() {
         assert!(adapters.best(true).is_err());
     }
     for scene in ["clip.toml", "hook.toml"] {
-        let part = prepared(scene);
+        let part = shipped(scene).1;
         let PreparedCompliance::All(stored) = &part.compliance else {
             panic!("the shipped parts fit into memory");
         };

@@ -6,8 +6,7 @@
 
 use glamx::DPose3;
 use snapin::engine::{Engine, FreeSettings, StepReport, switch_bound};
-use snapin::prepare::{PrepareOptions, PreparedPart, prepare};
-use snapin::progress::Ui;
+use snapin::prepare::PreparedPart;
 use snapin::scene::{Adaptive, FreeNodes, Multiply, PMethod, Scene};
 use snapin::setup;
 use snapin::shape::{Shape, largest};
@@ -22,10 +21,7 @@ fn clip(adaptive: Adaptive) -> Clip {
     let mut scene = Scene::load(&root().join("scenes/clip.toml")).unwrap();
     scene.accuracy.adaptive = adaptive;
     scene.accuracy.multiply = Multiply::Cpu;
-    let mut unseen = std::io::sink();
-    let ui = Ui::new(&mut unseen, false);
-    let spec = setup::part_spec(&scene).unwrap();
-    let prepared = prepare(&spec, &PrepareOptions::default(), &ui).unwrap();
+    let prepared = snapin_tests::prepared(&scene);
     Clip { scene, prepared }
 }
 

@@ -4,18 +4,13 @@ use contact::tool::Tool;
 use glam::DVec3;
 use glamx::DPose3;
 use snapin::engine::{Engine, StepReport};
-use snapin::prepare::{PrepareOptions, PreparedPart, prepare};
-use snapin::progress::Ui;
+use snapin::prepare::PreparedPart;
 use snapin::scene::Scene;
 use snapin::setup;
-use snapin_tests::root;
+use snapin_tests::shipped;
 
 fn clip() -> (Scene, PreparedPart, Tool) {
-    let scene = Scene::load(&root().join("scenes/clip.toml")).unwrap();
-    let mut unseen = std::io::sink();
-    let ui = Ui::new(&mut unseen, false);
-    let spec = setup::part_spec(&scene).unwrap();
-    let prepared = prepare(&spec, &PrepareOptions::default(), &ui).unwrap();
+    let (scene, prepared) = shipped("clip.toml");
     let (tool, _) = setup::tool(&scene).unwrap();
     (scene, prepared, tool)
 }

@@ -6,8 +6,7 @@ use std::sync::Arc;
 use contact::tool::Tool;
 use glamx::DPose3;
 use snapin::engine::{ContactPart, Engine};
-use snapin::prepare::{ColumnChoice, PrepareOptions, PreparedCompliance, PreparedPart, prepare};
-use snapin::progress::Ui;
+use snapin::prepare::{ColumnChoice, PreparedCompliance, PreparedPart};
 use snapin::scene::{Adaptive, Columns, FreeNodes, PMethod, Scalar, Scene};
 use snapin::setup;
 use snapin::stored::{Blocks, Source};
@@ -17,10 +16,7 @@ fn clip(columns: Columns, scalar: Scalar) -> (Scene, PreparedPart, Tool) {
     let mut scene = Scene::load(&root().join("scenes/clip.toml")).unwrap();
     scene.accuracy.columns = columns;
     scene.accuracy.contact_scalar = scalar;
-    let mut unseen = std::io::sink();
-    let spec = setup::part_spec(&scene).unwrap();
-    let ui = Ui::new(&mut unseen, false);
-    let prepared = prepare(&spec, &PrepareOptions::default(), &ui).unwrap();
+    let prepared = snapin_tests::prepared(&scene);
     let (tool, _) = setup::tool(&scene).unwrap();
     (scene, prepared, tool)
 }

@@ -4,20 +4,10 @@ use contact::tool::{BoxShape, Cylinder, Tool};
 use fem::{FactoredStiffness, Silent};
 use glam::{DQuat, DVec3};
 use glamx::DPose3;
-use snapin::prepare::{PrepareOptions, PreparedPart, assemble, prepare};
-use snapin::progress::Ui;
-use snapin::scene::{Scene, ToolFeatures};
+use snapin::prepare::assemble;
+use snapin::scene::ToolFeatures;
 use snapin::setup;
-use snapin_tests::{root, snapin};
-
-fn load(name: &str) -> (Scene, PreparedPart) {
-    let scene = Scene::load(&root().join("scenes").join(name)).unwrap();
-    let mut unseen = std::io::sink();
-    let ui = Ui::new(&mut unseen, false);
-    let spec = setup::part_spec(&scene).unwrap();
-    let prepared = prepare(&spec, &PrepareOptions::default(), &ui).unwrap();
-    (scene, prepared)
-}
+use snapin_tests::{root, shipped, snapin};
 
 /// N of a triangle with 6 nodes.
 fn tri6([a, b, c]: [f64; 3]) -> [f64; 6] {
@@ -37,7 +27,7 @@ fn tri6([a, b, c]: [f64; 3]) -> [f64; 6] {
 /// N_a n on the face's nodes, c_tool that of the coupling. The force is that to the turn of the face, some d / size.
 #[test]
 fn a_corner_in_a_quadratic_face_is_felt_as_by_a_full_solve() {
-    let (mut scene, prepared) = load("edge.toml");
+    let (mut scene, prepared) = shipped("edge.toml");
     let mesh = &prepared.loaded.mesh;
     let place = |node: u32| DVec3::from_array(mesh.nodes[node as usize]);
     let l = [0.42, 0.25, 0.33];
@@ -106,7 +96,7 @@ fn a_corner_in_a_quadratic_face_is_felt_as_by_a_full_solve() {
 #[test]
 fn round_tools_have_an_engine_without_edges() {
     for name in ["hook.toml", "clip.toml"] {
-        let (mut scene, prepared) = load(name);
+        let (mut scene, prepared) = shipped(name);
         let (tool, _) = setup::tool(&scene).unwrap();
         assert!(
             setup::tool_edges(&scene, &prepared, &tool)
@@ -138,7 +128,7 @@ fn round_tools_have_an_engine_without_edges() {
 /// alone it is one node after the other, each pushed by whichever side of the box is nearest.
 #[test]
 fn the_corner_of_the_shipped_scene_feels_the_ramp_and_not_its_nodes() {
-    let (mut scene, prepared) = load("edge.toml");
+    let (mut scene, prepared) = shipped("edge.toml");
     let (tool, _) = setup::tool(&scene).unwrap();
     let ramp = DVec3::new(30f64.to_radians().sin(), 30f64.to_radians().cos(), 0.0);
     let mut climb = |choice| {
@@ -206,7 +196,7 @@ fn features_that_are_not_there_are_an_error_that_says_so() {
 /// force steps less than with nodes alone.
 #[test]
 fn sharp_tools_go_over_the_hook_and_every_step_settles() {
-    let (mut scene, prepared) = load("edge.toml");
+    let (mut scene, prepared) = shipped("edge.toml");
     let brick = |half: DVec3| Tool::Box(BoxShape::new(half).unwrap());
     let rod = Tool::Cylinder(Cylinder::new(1.5e-3, Some(2e-3)).unwrap());
     let lean = DQuat::from_rotation_y(0.3) * DQuat::from_rotation_x(0.4);

@@ -5,24 +5,14 @@ use device::Wrench;
 use glam::{DQuat, DVec3};
 use glamx::DPose3;
 use snapin::engine::{Engine, StepReport};
-use snapin::prepare::{PrepareOptions, PreparedPart, prepare};
-use snapin::progress::Ui;
+use snapin::prepare::PreparedPart;
 use snapin::scene::{Rates, Scene};
 use snapin::session::fast::{FastLoop, FastSettings};
 use snapin::session::handover::Handed;
 use snapin::session::{self, Recording};
 use snapin::setup;
 use snapin::shape::Shape;
-use snapin_tests::{arg, root, snapin};
-
-fn prepared(name: &str) -> (Scene, PreparedPart) {
-    let scene = Scene::load(&root().join("scenes").join(name)).unwrap();
-    let mut unseen = std::io::sink();
-    let ui = Ui::new(&mut unseen, false);
-    let spec = setup::part_spec(&scene).unwrap();
-    let part = prepare(&spec, &PrepareOptions::default(), &ui).unwrap();
-    (scene, part)
-}
+use snapin_tests::{arg, root, shipped, snapin};
 
 fn held(scene: &Scene, part: &PreparedPart) -> session::Held {
     let (tool, _) = setup::tool(scene).unwrap();
@@ -59,7 +49,7 @@ fn apart(a: &[f64; 6], b: &[f64; 6]) -> f64 {
 #[test]
 fn a_frozen_problem_answers_at_its_own_target_as_the_step_did() {
     for name in ["clip.toml", "hook.toml"] {
-        let (scene, part) = prepared(name);
+        let (scene, part) = shipped(name);
         let mut engine = engine(&scene, &part);
         let mut problem = engine.frozen_problem();
         let mut touched = 0;
@@ -109,7 +99,7 @@ fn a_frozen_problem_answers_at_its_own_target_as_the_step_did() {
 /// nanometre is worth.
 #[test]
 fn measured_gaps_lead_to_the_answer_of_a_whole_step() {
-    let (scene, part) = prepared("clip.toml");
+    let (scene, part) = shipped("clip.toml");
     let directions = [
         (DVec3::new(0.0, -1.0, 0.0), DVec3::ZERO),
         (DVec3::new(0.6, 0.8, 0.0), DVec3::ZERO),
@@ -159,7 +149,7 @@ fn measured_gaps_lead_to_the_answer_of_a_whole_step() {
 
 /// A session of the clip with these rates.
 fn session_of(rates: Rates) -> Recording {
-    let (mut scene, part) = prepared("clip.toml");
+    let (mut scene, part) = shipped("clip.toml");
     scene.accuracy.rates = rates;
     scene.hand.as_mut().unwrap().hold = 0.02;
     let mut engine = engine(&scene, &part);
@@ -233,7 +223,7 @@ fn two_rates_render_what_whole_steps_would() {
 /// A loop at a target in the rise of the clip, with a problem that keeps its planes from 0.2 mm before, and one frozen
 /// there.
 fn loop_with_a_difference() -> (FastLoop, Box<Handed>, DPose3) {
-    let (scene, part) = prepared("clip.toml");
+    let (scene, part) = shipped("clip.toml");
     let mut engine = engine(&scene, &part);
     for k in 0..40 {
         engine.step(&at(&scene, 0.4 * f64::from(k) / 40.0));

@@ -71,6 +71,15 @@ pub(super) fn to_si(units: Units, quantity: Quantity) -> f64 {
     }
 }
 
+/// Unit of a quantity in the file.
+pub(super) fn label(units: Units, quantity: Quantity) -> &'static str {
+    let row = TABLE.iter().find(|row| row.0 == quantity);
+    row.map_or("", |row| match units {
+        Units::Si => row.2,
+        Units::MmNMpa => row.3,
+    })
+}
+
 /// Units of a quantity by its name in the schema: SI, mm-N-MPa.
 pub(super) fn labels(name: &str) -> Option<(&'static str, &'static str)> {
     TABLE

@@ -63,7 +63,7 @@ pub(super) fn shape(
 }
 
 /// P_0 to P_n and their derivatives at a coordinate.
-pub(super) fn polynomials(n: u8, x: f64) -> [(f64, f64); Order::HIGHEST as usize + 1] {
+fn polynomials(n: u8, x: f64) -> [(f64, f64); Order::HIGHEST as usize + 1] {
     let mut all = [(1.0, 0.0); Order::HIGHEST as usize + 1];
     for m in 0..usize::from(n) {
         let (value, slope) = all[m];

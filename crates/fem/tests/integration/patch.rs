@@ -77,9 +77,10 @@ fn patch_straight_elements_hold_their_degree_and_no_more() {
                 let error = error(order, field, quadrature, false);
                 if j <= i {
                     // Round-off of a well-conditioned solve.
-                    assert!(error < 2e-13, "order {order}, degree {}: {error:e}", j + 1);
+                    let limit = if order <= Order::Cubic { 1e-13 } else { 2e-13 };
+                    assert!(error < limit, "order {order}, degree {}: {error:e}", j + 1);
                 } else {
-                    assert!(error > 1e-6, "order {order}, degree {}: {error:e}", j + 1);
+                    assert!(error > 1e-5, "order {order}, degree {}: {error:e}", j + 1);
                 }
             }
         }
@@ -91,7 +92,8 @@ fn patch_straight_elements_hold_their_degree_and_no_more() {
 fn patch_curved_elements_hold_linear_fields_with_the_converged_rule() {
     for order in &ALL_ORDERS[1..] {
         let error = error(*order, linear, Quadrature::Converged, true);
-        assert!(error < 2e-13, "order {order}: {error:e}");
+        let limit = if *order <= Order::Cubic { 1e-13 } else { 2e-13 };
+        assert!(error < limit, "order {order}: {error:e}");
     }
 }
 

@@ -9,8 +9,7 @@ use fem::Mesh as PartMesh;
 use glam::{DQuat, DVec3};
 use glamx::DPose3;
 use snapin::engine::{ContactIterations, Engine, EngineSettings, StepReport};
-use snapin::prepare::{PrepareOptions, PreparedPart, prepare};
-use snapin::progress::Ui;
+use snapin::prepare::PreparedPart;
 use snapin::scene::{Scene, ToolFeatures};
 use snapin::session::fast::FastSettings;
 use snapin::session::slow::Stepped;
@@ -62,11 +61,7 @@ fn prepared(folder: &Path, case: &PartCase, mesh: &str, way: &str, k: usize) -> 
     let path = folder.join(format!("{}-{k}.toml", case.name));
     std::fs::write(&path, text).unwrap();
     let scene = Scene::load(&path).unwrap();
-    let mut unseen = std::io::sink();
-    let ui = Ui::new(&mut unseen, false);
-    let spec = setup::part_spec(&scene).unwrap();
-    let prepared = prepare(&spec, &PrepareOptions::default(), &ui)
-        .unwrap_or_else(|e| panic!("{} {way}: {e}", case.name));
+    let prepared = snapin_tests::prepared(&scene);
     Ready {
         name: format!("{} {way}", case.name),
         scene,

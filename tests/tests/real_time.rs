@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use device::Wrench;
 use glamx::DPose3;
 use snapin::engine::StepReport;
-use snapin::scene::{Adaptive, Columns, FreeNodes, Multiply, PMethod, Scalar, Scene};
+use snapin::scene::{Adaptive, Columns, FreeNodes, Multiply, Scalar, Scene};
 use snapin::session::fast::FastSettings;
 use snapin::session::slow::Stepped;
 use snapin::setup;
@@ -51,13 +51,10 @@ fn nothing_in_the_haptic_loop_allocates() {
 }
 
 /// All scenes, pushed in and pulled out again, a jump of the handle and a pose that is refused; the
-/// clip also with 32-bit numbers, with most of its columns missing, and with free nodes chosen, built and blended in on
-/// the way, and its shape drawn; and with fewer rows than nodes come near.
+/// clip also with 32-bit numbers, with most of its columns missing, and with its shape drawn from free nodes; and with fewer rows than nodes come near.
 fn no_step_of_an_insertion_allocates() {
-    let on = |method, free| Adaptive::On { method, free };
     let all = (Columns::All, Scalar::F64);
-    let bent = on(PMethod::Select, FreeNodes::Indicator(1e-3));
-    let constrained = on(PMethod::Constrain, FreeNodes::Radius(3e-3));
+    let bent = Adaptive::On(FreeNodes::Indicator(1e-3));
     for (name, adaptive, (columns, contact_scalar), rows) in [
         ("clip.toml", Adaptive::Off, all, None),
         (
@@ -75,9 +72,7 @@ fn no_step_of_an_insertion_allocates() {
         ("hook.toml", Adaptive::Off, all, None),
         ("edge.toml", Adaptive::Off, all, None),
         ("clip.toml", bent, all, None),
-        ("clip.toml", constrained, all, None),
         ("clip.toml", Adaptive::Off, all, Some(3)),
-        ("clip.toml", constrained, all, Some(3)),
     ] {
         let mut scene = Scene::load(&root().join("scenes").join(name)).unwrap();
         scene.accuracy.adaptive = adaptive;
@@ -107,7 +102,7 @@ fn no_step_of_an_insertion_allocates() {
             let report = engine.step(&at(share));
             touched += u32::from(report.contacts > 0);
             shared += u32::from(report.rows < report.near);
-            shape.update(&mut engine).unwrap();
+            shape.update(&engine).unwrap();
         }
         let after = ALLOCATIONS.load(Ordering::Relaxed);
         assert!(touched > 100, "{name}: contact in {touched} steps only");

@@ -70,8 +70,6 @@ pub enum Why {
     Numbers,
     /// The surface is drawn from fetched columns.
     Fetched,
-    /// The part is constrained, and drawn from two matrices.
-    Constrained,
     /// There is no adapter, or none but in software.
     NoAdapter {
         /// What was looked for and what was found.
@@ -95,7 +93,6 @@ impl Why {
             Self::Asked => "asked",
             Self::Numbers => "numbers",
             Self::Fetched => "fetched",
-            Self::Constrained => "constrained",
             Self::NoAdapter { .. } => "no_adapter",
             Self::Faster(_) => "faster",
             Self::Failed { .. } => "failed",
@@ -145,7 +142,6 @@ impl Choice {
             Why::Asked => ", as asked for".to_owned(),
             Why::Numbers => ": a GPU keeps no 64-bit numbers (scalar)".to_owned(),
             Why::Fetched => ": columns are fetched".to_owned(),
-            Why::Constrained => ": interface nodes are constrained".to_owned(),
             Why::NoAdapter {
                 is_software_there: false,
                 ..
@@ -240,19 +236,6 @@ pub(crate) fn choose(
         Multiply::Auto => asking.on_faster(&Adapters::find_hardware(), false, folder),
         Multiply::Gpu => asking.on_gpu(&Adapters::find()),
     }
-}
-
-/// The multiply on the processor, whatever the scene says of a GPU.
-///
-/// # Errors
-/// A compliance that the multiply refuses.
-pub(crate) fn on_processor(
-    layout: Layout,
-    blocks: &[&[f64]],
-    scalar: MultiplyScalar,
-    why: Why,
-) -> Result<(Multiplier, Choice), Error> {
-    Asking::new(layout, blocks, scalar).on_processor(why)
 }
 
 /// The choice where the surface is drawn without a multiply of its own.

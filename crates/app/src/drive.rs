@@ -281,7 +281,6 @@ impl Drive<'_> {
         };
         let contacts = self.engine.active_contacts();
         gone.recording.push(&entry, held, &report, contacts);
-        gone.recording.push_bubbles(self.engine.bubble_amplitudes());
         gone.asked.push(travel);
         report
     }

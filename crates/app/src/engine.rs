@@ -9,7 +9,6 @@
 
 mod clock;
 mod clusters;
-mod constrained;
 mod edges;
 mod fetched;
 mod frozen;
@@ -22,7 +21,6 @@ mod prune;
 mod report;
 mod rigid;
 mod scratch;
-mod switch;
 mod watch;
 
 use std::sync::Arc;
@@ -34,11 +32,6 @@ use device::VirtualCoupling;
 use glam::DVec3;
 use glamx::DPose3;
 
-use crate::free_nodes::LOOSE_RADIUS;
-
-use clock::StageClock;
-use constrained::Constrained;
-pub use constrained::{BubbleData, FreeSettings, MOST_FREE};
 use edges::Edges;
 pub use frozen::{FrozenProblem, Prediction};
 pub use held::Grip;
@@ -49,7 +42,6 @@ use part::Deformed;
 use prune::{GOOD_ENOUGH, MOST_ROUNDS};
 pub use report::{ActiveContact, N_STAGES, Stage, StepReport};
 use scratch::Scratch;
-pub use switch::switch_bound;
 use watch::{State, Watch};
 
 /// How often the contact planes are drawn anew within one step.
@@ -120,8 +112,6 @@ pub struct Engine {
     last_wrench: [f64; 6],
     /// m, point of the tool's rows in the last pass.
     reference: DVec3,
-    /// The p-method by Galerkin, where the scene asks for it.
-    constrained: Option<Box<Constrained>>,
     /// Where columns are fetched.
     late: Option<Late>,
     /// Corners and edges of the tool between the nodes, where it has some.
@@ -142,21 +132,10 @@ impl Engine {
         coupling: Option<VirtualCoupling>,
         settings: EngineSettings,
     ) -> Result<Self, contact::Error> {
-        Self::with_room(part, tool, coupling, settings, usize::MAX)
-    }
-
-    /// As [`Engine::new`], for at most `max_near` near nodes, or as many as there are rows.
-    fn with_room(
-        part: Arc<ContactPart>,
-        tool: Tool,
-        coupling: Option<VirtualCoupling>,
-        settings: EngineSettings,
-        max_near: usize,
-    ) -> Result<Self, contact::Error> {
         // Where columns come one by one, those that were taken in are the engine's own reckoning.
         let part = part.view().map_or(part, Arc::new);
         let max_contacts = settings.max_contacts.min(part.n_candidates()).max(1);
-        let max_near = NEAR_PER_ROW.saturating_mul(max_contacts).min(max_near);
+        let max_near = NEAR_PER_ROW.saturating_mul(max_contacts);
         let max_near = max_near.min(part.n_candidates()).max(max_contacts);
         let scratch = Scratch::new(part.n_candidates(), max_near, max_contacts);
         Ok(Self {
@@ -177,7 +156,6 @@ impl Engine {
             deviation: [0.0; 6],
             last_wrench: [0.0; 6],
             reference: DVec3::ZERO,
-            constrained: None,
             late: part.is_fetched().then(|| Late::new(max_contacts)),
             edges: None,
             part,
@@ -206,11 +184,7 @@ impl Engine {
     /// Has the tool's corners and edges touch the faces of the part between its nodes, too.
     ///
     /// The tool then moves in one go by no more than a quarter of the least height of an element behind a face.
-    ///
-    /// # Panics
-    /// If interface nodes are constrained: their faces do not follow the candidates alone (a programmer's mistake).
     pub fn with_edges(mut self, surface: Surface, features: Features) -> Self {
-        assert!(self.constrained.is_none(), "all interface nodes are free");
         let n_candidates = self.part.n_candidates();
         let stride = Edges::max_stride(&surface);
         self.settings.max_stride = self.settings.max_stride.min(stride);
@@ -233,38 +207,6 @@ impl Engine {
         self
     }
 
-    /// An engine whose part has constrained interface nodes, some of which are freed on the way.
-    ///
-    /// `rest`, `n_rows`, `coarse`: as for [`ContactPart::new`], the compliance with all interface nodes
-    /// constrained. `bubbles`: what freeing them adds.
-    ///
-    /// # Errors
-    /// As [`Engine::new`].
-    pub fn constrained(
-        part: ContactPart,
-        bubbles: BubbleData,
-        free: FreeSettings,
-        tool: Tool,
-        coupling: Option<VirtualCoupling>,
-        settings: EngineSettings,
-    ) -> Result<Self, contact::Error> {
-        let part = Arc::new(part.bounded_by(&bubbles.bounds));
-        let mut engine = Self::with_room(part, tool, coupling, settings, constrained::MOST_KNOWN)?;
-        let n_candidates = engine.part.n_candidates();
-        let max_near = engine.scratch.max_near();
-        let constrained = Constrained::new(bubbles, free, n_candidates, max_near);
-        engine.constrained = Some(Box::new(constrained));
-        // Its own operator keeps its own blocks.
-        engine.scratch.pairs = pairs::Pairs::new(n_candidates, 0);
-        Ok(engine)
-    }
-
-    /// m, how far from a node that can touch a node may be that is free under
-    /// [`FreeSettings::within`] this radius.
-    pub fn reach_of_free(radius: f64) -> f64 {
-        LOOSE_RADIUS * radius
-    }
-
     /// The part that steps act on.
     pub fn part(&self) -> &ContactPart {
         &self.part
@@ -278,11 +220,6 @@ impl Engine {
     /// The virtual coupling between handle and tool, if there is one.
     pub fn coupling(&self) -> Option<&VirtualCoupling> {
         self.held.coupling()
-    }
-
-    /// Whether interface nodes of the part are constrained (p-method by Galerkin).
-    pub fn is_constrained(&self) -> bool {
-        self.constrained.is_some()
     }
 
     /// Where the tool is after the last step, part's frame; None before the first.
@@ -321,9 +258,6 @@ impl Engine {
         self.last_target = None;
         self.deviation = [0.0; 6];
         self.last_wrench = [0.0; 6];
-        if let Some(constrained) = &mut self.constrained {
-            constrained.reset();
-        }
         if let Some(late) = &mut self.late {
             late.clear();
         }
@@ -338,30 +272,14 @@ impl Engine {
     }
 
     /// Displacement of candidate `candidate_idx` under the contact forces of the last step, m.
-    pub fn displacement(&mut self, candidate_idx: usize) -> DVec3 {
-        if let Some(constrained) = &mut self.constrained {
-            constrained.make_terms(&self.scratch.active);
-        }
+    pub fn displacement(&self, candidate_idx: usize) -> DVec3 {
         self.deformed().displacement(candidate_idx)
-    }
-
-    /// In a constrained part, free interface nodes by their number among the bubbles, and how far each
-    /// is from where it would follow (m), after the last step; empty otherwise.
-    pub fn bubble_amplitudes(&mut self) -> &[(u32, DVec3)] {
-        match &mut self.constrained {
-            None => &[],
-            Some(constrained) => {
-                constrained.make_terms(&self.scratch.active);
-                constrained.terms()
-            }
-        }
     }
 
     fn deformed(&self) -> Deformed<'_> {
         Deformed {
             part: &self.part,
             active: &self.scratch.active,
-            constrained: self.constrained.as_deref(),
             pairs: &self.scratch.pairs,
         }
     }
@@ -380,7 +298,6 @@ impl Engine {
             report.tool_pose = self.last_target.unwrap_or(DPose3::IDENTITY);
             return report;
         }
-        self.switch_free_nodes(&mut report);
         if let Some(late) = &mut self.late {
             if let Some(part) = Arc::get_mut(&mut self.part) {
                 part.take_in();
@@ -483,13 +400,11 @@ fn state_of<'a>(
     tool: &'a Tool,
     tool_pose: &'a DPose3,
     scratch: &'a Scratch,
-    constrained: Option<&'a Constrained>,
 ) -> State<'a> {
     State {
         deformed: Deformed {
             part,
             active: &scratch.active,
-            constrained,
             pairs: &scratch.pairs,
         },
         tool,

@@ -481,7 +481,7 @@ fn paper(rows: &[StepRow]) -> Vec<PaperStage> {
     PaperStage::duriez_2004(
         median(&|r| Some(of(r, &[Stage::Proximity, Stage::Planes]))),
         median(&|r| {
-            let response = [Stage::Delassus, Stage::Lcp, Stage::Update, Stage::FreeNodes];
+            let response = [Stage::Delassus, Stage::Lcp, Stage::Update];
             Some(of(r, &response))
         }),
         median(&|r| r.multiply_ns),

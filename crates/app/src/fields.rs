@@ -2,9 +2,8 @@
 
 use std::sync::OnceLock;
 
+use fem::FactoredStiffness;
 use fem::stress::Extremes;
-use fem::{ConstrainedStiffness, FactoredStiffness, Hierarchy, Rule, Stiffness};
-use glam::DVec3;
 
 use crate::Error;
 use crate::evaluate::strain::{Moment, StrainPeaks, StrainReader};
@@ -35,25 +34,14 @@ impl Field {
 #[derive(Debug)]
 pub struct FieldSolver<'a> {
     loaded: &'a LoadedPart,
-    solver: Solver<'a>,
+    factor: Box<FactoredStiffness>,
     of_element: Vec<u32>,
     /// Made when strain is first asked for.
     strain: OnceLock<StrainReader<'a>>,
 }
 
-#[derive(Debug)]
-enum Solver<'a> {
-    Full(Box<FactoredStiffness>),
-    Constrained {
-        stiffness: Stiffness,
-        coarse: Box<ConstrainedStiffness>,
-        /// Nodes of the bubbles.
-        bubbles: &'a [u32],
-    },
-}
-
 impl<'a> FieldSolver<'a> {
-    /// Assembles and factors the stiffness, of the constrained part where that is what was felt.
+    /// Assembles and factors the stiffness.
     ///
     /// # Errors
     /// As `fem` reports them; Ctrl-C.
@@ -61,28 +49,11 @@ impl<'a> FieldSolver<'a> {
         let loaded = &prepared.loaded;
         let stiffness = assemble(loaded)?;
         let in_part = |e| Error::part(&loaded.spec.mesh_path, e);
-        let solver = match &prepared.bubbles {
-            None => {
-                let factor = FactoredStiffness::new(&stiffness, loaded.solved_supports(), progress);
-                Solver::Full(Box::new(factor.map_err(in_part)?))
-            }
-            Some(bubbles) => {
-                let hierarchy = Hierarchy::of(&loaded.mesh);
-                let all = hierarchy.interface_nodes();
-                let constraints = hierarchy.constrain(all, &loaded.supports, Rule::AffineExact);
-                let coarse =
-                    ConstrainedStiffness::new(&stiffness, &loaded.supports, &constraints, progress)
-                        .map_err(in_part)?;
-                Solver::Constrained {
-                    stiffness,
-                    coarse: Box::new(coarse),
-                    bubbles: &bubbles.bubbles,
-                }
-            }
-        };
+        let factor = FactoredStiffness::new(&stiffness, loaded.solved_supports(), progress)
+            .map_err(in_part)?;
         Ok(Self {
             loaded,
-            solver,
+            factor: Box::new(factor),
             of_element: vec![0; loaded.mesh.n_elements()],
             strain: OnceLock::new(),
         })
@@ -96,38 +67,15 @@ impl<'a> FieldSolver<'a> {
             let at = 3 * self.loaded.contact_node(c.candidate) as usize;
             force[at..at + 3].copy_from_slice(&c.force_on_part.to_array());
         }
-        if let (Solver::Full(factor), Some(interior)) = (&self.solver, &self.loaded.interior) {
-            let solved = factor.solve(&interior.forces(&force));
+        if let Some(interior) = &self.loaded.interior {
+            let solved = self.factor.solve(&interior.forces(&force));
             return Field {
                 at_nodes: interior.at_surface::<3>(&solved, 0.0),
                 solved: Some(solved),
             };
         }
-        let at_nodes = match &self.solver {
-            Solver::Full(factor) => factor.solve(&force),
-            Solver::Constrained {
-                stiffness,
-                coarse,
-                bubbles,
-            } => {
-                // u = B b + T C_1 Tᵀ (f - K B b): the rest in equilibrium with the bubbles as they were.
-                let mut of_bubbles = vec![0.0; n_dofs];
-                for (bubble, amplitude) in recording.bubbles(record) {
-                    let at = 3 * bubbles[*bubble as usize] as usize;
-                    of_bubbles[at..at + 3].copy_from_slice(&DVec3::to_array(amplitude));
-                }
-                for (f, of_bubbles) in force.iter_mut().zip(stiffness.multiply(&of_bubbles)) {
-                    *f -= of_bubbles;
-                }
-                let mut u = coarse.solve(&force);
-                for (u, of_bubbles) in u.iter_mut().zip(&of_bubbles) {
-                    *u += of_bubbles;
-                }
-                u
-            }
-        };
         Field {
-            at_nodes,
+            at_nodes: self.factor.solve(&force),
             solved: None,
         }
     }

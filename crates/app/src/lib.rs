@@ -19,7 +19,6 @@ mod error;
 mod evaluate;
 pub mod fields;
 mod follow;
-mod free_nodes;
 pub mod interrupt;
 mod leftovers;
 pub mod machine;

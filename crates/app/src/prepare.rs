@@ -4,7 +4,6 @@
 //! is cached under a hash of everything it depends on ([`cache`]); what it will need is told
 //! before it is begun ([`budget`]).
 
-mod bubbles;
 pub mod budget;
 pub mod cache;
 mod demand;
@@ -17,14 +16,14 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use fem::{
-    BubbleCompliance, Compliance, ComplianceChecks, FactoredStiffness, Material, Mesh,
-    OrderedStiffness, Quadrature, Supports,
+    Compliance, ComplianceChecks, FactoredStiffness, Material, Mesh, OrderedStiffness, Quadrature,
+    Supports,
 };
 use glam::DVec3;
 use gpu::Scalar;
 
 use crate::Error;
-use crate::engine::{BubbleData, ContactPart};
+use crate::engine::ContactPart;
 use crate::progress::Ui;
 use crate::stored::{Blocks, Source, StoredCompliance};
 use budget::Forecast;
@@ -62,8 +61,6 @@ pub struct PartSpec {
     pub contact: Vec<GroupRef>,
     /// Rule for the element integrals.
     pub quadrature: Quadrature,
-    /// Which interface nodes may be freed in a constrained part; `None`: nothing is constrained.
-    pub bubbles: Option<BubbleReach>,
     /// Which columns of the compliance are there from the start.
     pub columns: ColumnChoice,
     /// Numbers in which the compliance between candidates is kept for the step.
@@ -107,15 +104,6 @@ impl PreparedCompliance {
             Self::Near(_) => None,
         }
     }
-}
-
-/// Which interface nodes may be freed while a constrained part is touched.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum BubbleReach {
-    /// All of the part.
-    All,
-    /// Those within this distance of a node that can touch, m.
-    Within(f64),
 }
 
 /// How to prepare.
@@ -179,8 +167,6 @@ pub struct PreparedPart {
     pub compliance: PreparedCompliance,
     /// What was checked after the build.
     pub checks: ComplianceChecks,
-    /// The constrained part, where it is asked for.
-    pub bubbles: Option<BubbleCompliance>,
     /// Seconds by stage, in order; a cached part has only the reading.
     pub seconds: Vec<(&'static str, f64)>,
     /// Whether the compliance came from the cache.
@@ -197,50 +183,7 @@ impl PreparedPart {
 
     /// Bytes of what the step and the drawn shape read.
     pub fn bytes(&self) -> f64 {
-        let of_bubbles = self.bubbles.as_ref().map_or(0.0, |b| {
-            BubbleCompliance::bytes(b.candidates.len(), b.rows.len(), b.bubbles.len())
-        });
-        self.compliance.bytes() + of_bubbles
-    }
-
-    /// What the engine needs of the part with constrained interface nodes; `whole`: the compliance of the part
-    /// without constraints.
-    pub fn constrained_part(
-        &self,
-        bubbles: &BubbleCompliance,
-        whole: &StoredCompliance,
-    ) -> (ContactPart, BubbleData) {
-        let at = |node: &u32| DVec3::from_array(self.loaded.mesh.nodes[*node as usize]);
-        let (n_rows, n_bubbles) = (bubbles.rows.len(), bubbles.bubbles.len());
-        let n_candidates = bubbles.candidates.len();
-        // The step reads the bubbles of one candidate after the other.
-        // Held candidates, which come last, neither move bubbles nor are moved by them.
-        let held = self.loaded.held_positions();
-        let mut coupling = vec![0.0; 9 * (n_candidates + held.len()) * n_bubbles];
-        for j in 0..n_bubbles {
-            for i in 0..n_candidates {
-                coupling[9 * (i * n_bubbles + j)..][..9]
-                    .copy_from_slice(&bubbles.coupling[9 * (j * n_rows + i)..][..9]);
-            }
-        }
-        // A block off the diagonal of a positive definite matrix is no larger than the geometric
-        // mean of its two diagonal blocks; constrained parts are stiffer than the whole one.
-        let norms: Vec<f64> = (0..n_candidates)
-            .map(|i| whole.block(i, i).iter().map(|c| c * c).sum())
-            .map(f64::sqrt)
-            .collect();
-        let largest = norms.iter().copied().fold(0.0, f64::max);
-        let bounds = norms.iter().map(|norm| (norm * largest).sqrt());
-        let data = BubbleData {
-            positions: bubbles.bubbles.iter().map(at).collect(),
-            coupling,
-            sigma: bubbles.sigma.clone(),
-            bounds: bounds.chain(held.iter().map(|_| 0.0)).collect(),
-        };
-        let rest = bubbles.candidates.iter().map(at).collect();
-        let blocks = Blocks::F64(Source::Owned(bubbles.coarse.clone()));
-        let part = ContactPart::with_all_and_held(rest, &held, n_rows, blocks);
-        (part, data)
+        self.compliance.bytes()
     }
 
     /// What the engine needs of the part. Shares the compliance unless it is rounded to 32 bits.
@@ -282,15 +225,6 @@ pub fn prepare(
     }
     let mut seconds = vec![("read the mesh", begun.elapsed().as_secs_f64())];
     let (compliance, checks, cached) = compliance_of(&loaded, options, ui, &mut seconds)?;
-    let bubbles = match loaded.spec.bubbles {
-        Some(reach) => {
-            let building = Instant::now();
-            let built = bubbles::build(&loaded, reach, ui)?;
-            seconds.push(("constrained part", building.elapsed().as_secs_f64()));
-            Some(built)
-        }
-        None => None,
-    };
     let (from_cache, cache_file) = match cached {
         Cached::Read(file) => (true, Some(file)),
         Cached::Written(file) => (false, Some(file)),
@@ -300,7 +234,6 @@ pub fn prepare(
         loaded,
         compliance,
         checks,
-        bubbles,
         seconds,
         from_cache,
         cache_file,

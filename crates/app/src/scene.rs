@@ -28,8 +28,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use accuracy::{
-    Accuracy, Adaptive, Columns, ContactIterations, FreeNodes, Multiply, MultiplyScalar, PMethod,
-    Preset, Rates, Scalar, ToolFeatures,
+    Accuracy, Adaptive, Columns, ContactIterations, FreeNodes, Multiply, MultiplyScalar, Preset,
+    Rates, Scalar, ToolFeatures,
 };
 pub use error::SceneError;
 pub use handbook::Handbook;

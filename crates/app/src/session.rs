@@ -68,7 +68,6 @@ pub struct Record {
     /// ns, the surface multiply, in periods that had one.
     pub multiply_ns: Option<u64>,
     contacts: Range<usize>,
-    bubbles: Range<usize>,
 }
 
 /// Everything a session leaves behind.
@@ -89,7 +88,6 @@ pub struct Recording {
     /// What two rates tell, if there were two.
     pub two_rates: Option<TwoRates>,
     contacts: Vec<ActiveContact>,
-    bubbles: Vec<(u32, DVec3)>,
 }
 
 /// What a record is made of, besides the step itself.
@@ -115,7 +113,6 @@ impl Recording {
             rates,
             two_rates: None,
             contacts: Vec::with_capacity(64 * n_records),
-            bubbles: Vec::new(),
         }
     }
 
@@ -144,27 +141,12 @@ impl Recording {
             step_ns: entry.step_ns,
             multiply_ns: None,
             contacts: contacts_from..self.contacts.len(),
-            bubbles: self.bubbles.len()..self.bubbles.len(),
         });
-    }
-
-    /// Adds the free interface nodes of a constrained part to the last record.
-    pub(crate) fn push_bubbles(&mut self, amplitudes: &[(u32, DVec3)]) {
-        self.bubbles.extend_from_slice(amplitudes);
-        if let Some(last) = self.records.last_mut() {
-            last.bubbles.end = self.bubbles.len();
-        }
     }
 
     /// Contacts that carried force in a record.
     pub fn contacts(&self, record: &Record) -> &[ActiveContact] {
         &self.contacts[record.contacts.clone()]
-    }
-
-    /// Free interface nodes of a constrained part, by their number among its bubbles, and how far
-    /// they are from where they would follow, m.
-    pub fn bubbles(&self, record: &Record) -> &[(u32, DVec3)] {
-        &self.bubbles[record.bubbles.clone()]
     }
 
     /// N, along the approach direction, positive when it resists.
@@ -298,7 +280,6 @@ impl Session<'_> {
                     step_ns,
                 };
                 recorder.push(handle, &solved, engine.active_contacts());
-                recorder.push_bubbles(engine.bubble_amplitudes());
                 wrench
             })?;
             if period % DISPLAY_INTERVAL == 0 {

@@ -15,13 +15,11 @@ use fem::{Material, Quadrature};
 
 use crate::Error;
 use crate::drive::DriveSpec;
-use crate::engine::{ContactIterations, Engine, EngineSettings, FreeSettings};
+use crate::engine::{ContactIterations, Engine, EngineSettings};
 use crate::machine::Machine;
 use crate::prepare::budget::bytes;
-use crate::prepare::{BubbleReach, ColumnChoice, GroupRef, PartSpec, PreparedPart};
-use crate::scene::{
-    self, Adaptive, FreeNodes, PMethod, QuadratureRule, Scene, ToolFeatures, ToolShape,
-};
+use crate::prepare::{ColumnChoice, GroupRef, PartSpec, PreparedPart};
+use crate::scene::{self, Adaptive, QuadratureRule, Scene, ToolFeatures, ToolShape};
 use crate::session::rates::Rates;
 use crate::session::{Clearance, Held, Holds, SessionSpec, part_extent};
 
@@ -36,7 +34,7 @@ pub fn part_spec(scene: &Scene) -> Result<PartSpec, Error> {
         place: place(g.line),
     };
     let material = &scene.part.material;
-    // What draws between nodes or constrains them needs all columns.
+    // What draws between nodes needs all columns.
     let is_plain = scene.accuracy.adaptive == Adaptive::Off;
     Ok(PartSpec {
         mesh_path: scene.part.mesh.clone(),
@@ -44,16 +42,6 @@ pub fn part_spec(scene: &Scene) -> Result<PartSpec, Error> {
         order: scene.part.order,
         interior_order: scene.part.interior_order,
         refinements: 0,
-        bubbles: match scene.accuracy.adaptive {
-            Adaptive::On {
-                method: PMethod::Constrain,
-                free,
-            } => Some(match free {
-                FreeNodes::Radius(radius) => BubbleReach::Within(Engine::reach_of_free(radius)),
-                FreeNodes::Indicator(_) | FreeNodes::BudgetUs(_) => BubbleReach::All,
-            }),
-            _ => None,
-        },
         columns: match scene.accuracy.columns {
             scene::Columns::Auto if is_plain => ColumnChoice::Auto,
             scene::Columns::Near if is_plain => ColumnChoice::Near,
@@ -280,7 +268,7 @@ fn engine_with(
         near_distance: scene.accuracy.near_distance.unwrap_or(NEAR_SHARE * size),
         max_contacts,
         merge_tolerance: scene.accuracy.merge_tolerance,
-        lcp: lcp_settings(scene),
+        lcp: lcp::Settings::default(),
         max_stride: STRIDE_SHARE * size,
     };
     let in_scene = |source| Error::Tool {
@@ -288,27 +276,8 @@ fn engine_with(
         source,
     };
     let edges = tool_edges(scene, prepared, &tool)?;
-    let (bubbles, whole) = (&prepared.bubbles, prepared.compliance.all());
-    let engine = match (scene.accuracy.adaptive, bubbles, whole) {
-        (
-            Adaptive::On {
-                method: PMethod::Constrain,
-                free,
-            },
-            Some(bubbles),
-            Some(whole),
-        ) => {
-            let (coarse, data) = prepared.constrained_part(bubbles, whole);
-            let rule = match free {
-                FreeNodes::Radius(radius) => FreeSettings::within(radius),
-                FreeNodes::Indicator(limit) => FreeSettings::bent_beyond(limit),
-                FreeNodes::BudgetUs(budget) => FreeSettings::affordable(budget, &data),
-            };
-            Engine::constrained(coarse, data, rule, tool, coupling, settings)
-        }
-        _ => Engine::new(prepared.contact_part(), tool, coupling, settings),
-    };
-    let engine = engine.map_err(in_scene)?;
+    let engine =
+        Engine::new(prepared.contact_part(), tool, coupling, settings).map_err(in_scene)?;
     if let (Some(_), scene::Rates::Every(_)) = (&edges, scene.accuracy.rates) {
         return Err(Error::Input(format!(
             "{}: accuracy.rates.every does not go with a tool whose corners and edges touch; write tool_features = \
@@ -338,13 +307,6 @@ pub fn tool_edges(
         ToolFeatures::Auto => None,
         ToolFeatures::On { line } => Some(line),
     };
-    let is_constrained = matches!(
-        scene.accuracy.adaptive,
-        Adaptive::On {
-            method: PMethod::Constrain,
-            ..
-        }
-    );
     let missing = |what: &str| match insists {
         Some(line) => Err(Error::Input(format!(
             "{}:{line}: accuracy.tool_features is \"on\", but {what}; use \"auto\" or leave the key out",
@@ -352,9 +314,6 @@ pub fn tool_edges(
         ))),
         None => Ok(None),
     };
-    if is_constrained {
-        return missing("the interface nodes are constrained");
-    }
     let in_scene = |source| Error::Tool {
         path: scene.path.clone(),
         source,
@@ -369,26 +328,6 @@ pub fn tool_edges(
     let spacing = SPACING_SHARE * sizes.fold(f64::INFINITY, f64::min);
     let features = Features::new(tool, spacing).map_err(in_scene)?;
     Ok(features.map(|features| (surface, features)))
-}
-
-/// Sweeps of Gauss-Seidel for each round of pivoting that was allowed: a sweep costs about a tenth of
-/// a round.
-const SWEEPS_PER_ROUND: usize = 10;
-
-fn lcp_settings(scene: &Scene) -> lcp::Settings {
-    let exact = lcp::Settings {
-        tolerance: scene.accuracy.lcp_tolerance,
-        ..lcp::Settings::default()
-    };
-    match scene.accuracy.lcp_rounds {
-        None => exact,
-        Some(rounds) => lcp::Settings {
-            max_rounds: rounds,
-            max_pivots: 0,
-            max_sweeps: SWEEPS_PER_ROUND * rounds,
-            ..exact
-        },
-    }
 }
 
 /// m. A nanometre on a part of 10 kN/m is a hundred-thousandth of a newton.

@@ -3,9 +3,9 @@
 //! At display rate, not in the step. With all interface nodes free it is the dense multiply
 //! `u = C f` over the surface's rows. With the p-method's "select" only principal and free interface
 //! nodes are multiplied, the others interpolated (Duriez et al. 2004, section 3.2: U_ic = G U_p); the
-//! forces do not depend on it. With "constrain" it is the shape of the constrained part that the
-//! engine solves for.
+//! forces do not depend on it.
 
+mod free_nodes;
 mod select;
 #[cfg(test)]
 mod tests;
@@ -16,11 +16,11 @@ use std::sync::Arc;
 use gpu::{ComplianceMultiply, Layout};
 
 use crate::Error;
-use crate::choice::{self, Choice, Multiplier, Why, choose};
+use crate::choice::{self, Choice, Multiplier, choose};
 use crate::engine::Engine;
 use crate::follow::Follower;
 use crate::prepare::{Demand, PreparedCompliance, PreparedPart};
-use crate::scene::{Accuracy, Adaptive, Multiply, PMethod};
+use crate::scene::{Accuracy, Adaptive, Multiply};
 use select::Select;
 
 /// Displacement of all surface nodes, with its buffers.
@@ -42,11 +42,6 @@ enum Kind {
     /// From the columns that were fetched.
     Fetched(Arc<Demand>),
     Select(Box<Select>),
-    Constrained {
-        coarse: Multiplier,
-        coupling: Multiplier,
-        of_bubbles: Vec<f64>,
-    },
 }
 
 impl Shape {
@@ -62,8 +57,8 @@ impl Shape {
     ) -> Result<Self, Error> {
         let n_candidates = prepared.loaded.candidates.len();
         let n_rows = prepared.loaded.rows.len();
-        let (kind, choice) = match (&prepared.compliance, accuracy.adaptive, &prepared.bubbles) {
-            (PreparedCompliance::Near(demand), ..) => {
+        let (kind, choice) = match (&prepared.compliance, accuracy.adaptive) {
+            (PreparedCompliance::Near(demand), _) => {
                 refuse_gpu(
                     accuracy,
                     "its columns are fetched, because the compliance is larger than the memory or the scene says so",
@@ -71,43 +66,20 @@ impl Shape {
                 let choice = choice::fetched(prepared.loaded.spec.contact_scalar);
                 (Kind::Fetched(Arc::clone(demand)), choice)
             }
-            (
-                PreparedCompliance::All(_),
-                Adaptive::On {
-                    method: PMethod::Constrain,
-                    ..
-                },
-                Some(bubbles),
-            ) => {
-                refuse_gpu(accuracy, "its interface nodes are constrained")?;
-                let on_processor = |n_columns: usize, blocks: &[&[f64]]| {
-                    let layout = Layout::new(n_rows, n_columns)?;
-                    choice::on_processor(layout, blocks, accuracy.scalar, Why::Constrained)
-                };
-                let (coarse, choice) = on_processor(n_candidates, &[&bubbles.coarse])?;
-                let (coupling, _) = on_processor(bubbles.bubbles.len(), &[&bubbles.coupling])?;
-                let kind = Kind::Constrained {
-                    coarse,
-                    coupling,
-                    of_bubbles: vec![0.0; 3 * n_rows],
-                };
-                (kind, choice)
-            }
-            (PreparedCompliance::All(whole), Adaptive::On { free, .. }, _) => {
+            (PreparedCompliance::All(whole), Adaptive::On(free)) => {
                 let multiply = |layout, blocks: &[&[f64]]| choose(layout, blocks, accuracy, folder);
                 let (select, choice) = Select::new(prepared, whole, free, multiply)?;
                 (Kind::Select(Box::new(select)), choice)
             }
-            (PreparedCompliance::All(whole), Adaptive::Off, _) => {
+            (PreparedCompliance::All(whole), Adaptive::Off) => {
                 let layout = Layout::new(n_rows, n_candidates)?;
                 let (multiply, choice) = choose(layout, &whole.stretches(), accuracy, folder)?;
                 (Kind::Full(multiply), choice)
             }
         };
-        let n_columns = match (&kind, &prepared.bubbles) {
-            (Kind::Fetched(_), _) => 0,
-            (Kind::Constrained { .. }, Some(bubbles)) => n_candidates.max(bubbles.bubbles.len()),
-            _ => n_candidates,
+        let n_columns = match &kind {
+            Kind::Fetched(_) => 0,
+            Kind::Full(_) | Kind::Select(_) => n_candidates,
         };
         Ok(Self {
             kind,
@@ -147,7 +119,7 @@ impl Shape {
         match &self.kind {
             Kind::Full(multiply) => Some(multiply),
             Kind::Select(select) => Some(select.multiplier()),
-            Kind::Fetched(_) | Kind::Constrained { .. } => None,
+            Kind::Fetched(_) => None,
         }
     }
 
@@ -170,7 +142,7 @@ impl Shape {
     pub fn n_free(&self) -> Option<usize> {
         match &self.kind {
             Kind::Select(select) => Some(select.n_free()),
-            Kind::Full(_) | Kind::Fetched(_) | Kind::Constrained { .. } => None,
+            Kind::Full(_) | Kind::Fetched(_) => None,
         }
     }
 
@@ -179,7 +151,7 @@ impl Shape {
     ///
     /// # Errors
     /// Those of the multiply, which an engine's state does not give.
-    pub fn update(&mut self, engine: &mut Engine) -> Result<&[f64], Error> {
+    pub fn update(&mut self, engine: &Engine) -> Result<&[f64], Error> {
         let contacts = engine.active_contacts();
         self.columns.clear();
         self.forces.clear();
@@ -209,27 +181,6 @@ impl Shape {
                 let given = (self.columns.as_slice(), self.forces.as_slice());
                 select.update(rest, given, self.waits, &mut self.displacement)?;
                 note_given_up(select.multiplier_mut().get(), &mut self.given_up);
-            }
-            Kind::Constrained {
-                coarse,
-                coupling,
-                of_bubbles,
-            } => {
-                coarse
-                    .get()
-                    .multiply_into(&self.columns, &self.forces, &mut self.displacement)?;
-                self.columns.clear();
-                self.forces.clear();
-                for (bubble, amplitude) in engine.bubble_amplitudes() {
-                    self.columns.push(*bubble);
-                    self.forces.extend(amplitude.to_array());
-                }
-                coupling
-                    .get()
-                    .multiply_into(&self.columns, &self.forces, of_bubbles)?;
-                for (u, more) in self.displacement.iter_mut().zip(of_bubbles) {
-                    *u += *more;
-                }
             }
         }
         Ok(&self.displacement)

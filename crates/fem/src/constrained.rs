@@ -6,10 +6,7 @@
 //!
 //! û are the degrees of freedom that do not follow. The part is stiffer than the full one always:
 //! C - Ĉ is positive semi-definite, and a force drops in a step when a node is freed.
-//! [`ConstrainedStiffness`] assembles and factors K̂ for one set of free nodes. The data from which
-//! any set is had in real time are in [`BubbleCompliance`].
-
-mod bubbles;
+//! [`ConstrainedStiffness`] assembles and factors K̂ for one set of free nodes.
 
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use rayon::prelude::*;
@@ -20,8 +17,6 @@ use crate::factor::FactoredStiffness;
 use crate::hierarchy::Constraints;
 use crate::progress::Progress;
 use crate::supports::Supports;
-
-pub use bubbles::BubbleCompliance;
 
 /// K̂ = Tᵀ K T, factored.
 #[derive(Debug)]

@@ -56,7 +56,7 @@ mod supports;
 
 pub use assembly::{Stiffness, assemble_stiffness};
 pub use compliance::{Compliance, ComplianceChecks};
-pub use constrained::{BubbleCompliance, ConstrainedStiffness};
+pub use constrained::ConstrainedStiffness;
 pub use element::Order;
 pub use error::Error;
 pub use factor::FactoredStiffness;

@@ -307,24 +307,6 @@ fn an_order_at_which_an_element_turns_over_is_refused_with_its_tag() {
     }
 }
 
-#[test]
-fn a_part_without_interface_nodes_cannot_constrain_them() {
-    let dir = tempfile::tempdir().unwrap();
-    let scene = scene_with(dir.path(), |text| {
-        set(text, "order", "1")
-            + "[accuracy]\nadaptive = { method = \"constrain\", radius = 0.001 }\n"
-    });
-    let outcome = run(&scene);
-    assert_eq!(outcome.code, 2, "{}", outcome.err);
-    assert!(
-        outcome
-            .err
-            .contains("no interface nodes to constrain; set accuracy.order to 2"),
-        "{}",
-        outcome.err
-    );
-}
-
 /// A margin of nothing and one that takes in the whole part; both mend by leaving it out.
 #[test]
 fn a_distance_of_near_nodes_of_nothing_or_beyond_the_part_is_refused() {

@@ -140,8 +140,6 @@ fn held_nodes_stop_every_tool() {
         (f - 2.142).abs() < 0.02 && (t - 0.2).abs() < 0.6 * 0.6 / (2.0 * 5.0) + 0.01,
         "{f} {t}"
     );
-    let constrain = "[accuracy]\norder = 2\nadaptive = { method = \"constrain\", radius = 0.002 }";
-    assert_peak(&bar(ball, constrain), 2.142, 0.200);
     let capsule = "shape = \"capsule\"\nradius = 0.002\nhalf_length = 0.002\nposition = [0.008, 0.005, 0.0062]\n\
                    axis = [1, 0, 0]";
     let tube =

@@ -107,12 +107,4 @@ fn orders_that_do_not_fit_are_refused_with_those_that_do() {
     refused(&with_orders(2, 3), &["interior_order = 3", "write 2 or 4"]);
     refused(&with_orders(3, 2), &["interior_order = 2", "write 3"]);
     refused(&with_orders(2, 6), &["interior_order", "1 to 5"]);
-    let constrained = |text: &str| {
-        with_orders(2, 4)(text)
-            + "\n[accuracy]\nadaptive = { method = \"constrain\", radius = 0.001 }\n"
-    };
-    refused(
-        &constrained,
-        &["interior_order = 4", "leave one of the two out"],
-    );
 }

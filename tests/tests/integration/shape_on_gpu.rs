@@ -6,7 +6,7 @@ use std::time::Duration;
 use snapin::engine::Engine;
 use snapin::prepare::{PrepareOptions, PreparedPart, prepare};
 use snapin::progress::Ui;
-use snapin::scene::{Adaptive, FreeNodes, Multiply, MultiplyScalar, PMethod, Scene};
+use snapin::scene::{Adaptive, FreeNodes, Multiply, MultiplyScalar, Scene};
 use snapin::session::{self, Recording};
 use snapin::setup;
 use snapin::shape::Shape;
@@ -78,10 +78,7 @@ fn session_with(shape: &mut Shape, scene: &Scene, part: &PreparedPart) -> Record
 #[test]
 fn a_session_on_a_gpu_has_the_same_forces_and_nearly_the_same_shape() {
     let (mut scene, part) = clip();
-    let select = Adaptive::On {
-        method: PMethod::Select,
-        free: FreeNodes::Radius(2e-3),
-    };
+    let select = Adaptive::On(FreeNodes::Radius(2e-3));
     for (adaptive, scalar, bound) in [
         (Adaptive::Off, MultiplyScalar::Auto, 1e-6),
         (Adaptive::Off, MultiplyScalar::F16, 2e-3),
@@ -113,13 +110,7 @@ fn a_session_on_a_gpu_has_the_same_forces_and_nearly_the_same_shape() {
 #[test]
 fn without_waiting_the_shape_arrives_later() {
     let (mut scene, part) = clip();
-    for adaptive in [
-        Adaptive::Off,
-        Adaptive::On {
-            method: PMethod::Select,
-            free: FreeNodes::Radius(0.0),
-        },
-    ] {
+    for adaptive in [Adaptive::Off, Adaptive::On(FreeNodes::Radius(0.0))] {
         scene.accuracy.adaptive = adaptive;
         let Some(mut shape) = shape_on_gpu(&part, &scene) else {
             return;
@@ -136,15 +127,15 @@ fn without_waiting_the_shape_arrives_later() {
         }
         assert!(engine.active_contacts().len() > 1);
         let exact = shape_on_processor(&part, &scene)
-            .update(&mut engine)
+            .update(&engine)
             .unwrap()
             .to_vec();
-        let first = shape.update(&mut engine).unwrap();
+        let first = shape.update(&engine).unwrap();
         assert!(first.iter().all(|u| *u == 0.0), "nothing was asked for yet");
         let bound = 1e-6 * snapin::shape::largest(&exact);
         let has_arrived = (0..10_000).any(|_| {
             std::thread::sleep(Duration::from_millis(1));
-            let u = shape.update(&mut engine).unwrap();
+            let u = shape.update(&engine).unwrap();
             u.iter().zip(&exact).all(|(a, b)| (a - b).abs() <= bound)
         });
         assert!(has_arrived, "{adaptive:?}");
@@ -171,7 +162,7 @@ fn a_real_time_session_on_a_gpu_has_the_same_forces() {
     assert!(in_time.max_surface_displacement > 0.0);
 }
 
-/// A constrained part is drawn from two matrices, fetched columns are no whole matrix: told, not done in silence.
+/// Fetched columns are no whole matrix: told, not done in silence.
 #[test]
 fn gpu_is_refused_where_the_whole_compliance_is_not_multiplied() {
     let (mut scene, _) = clip();
@@ -192,23 +183,4 @@ fn gpu_is_refused_where_the_whole_compliance_is_not_multiplied() {
         error.contains("its columns are fetched") && error.contains("multiply = \"auto\""),
         "{error}"
     );
-
-    let (mut scene, _) = clip();
-    scene.accuracy.adaptive = Adaptive::On {
-        method: PMethod::Constrain,
-        free: FreeNodes::Radius(1e-3),
-    };
-    let constrained = prepared(&scene);
-    let mut accuracy = scene.accuracy.clone();
-    let shape = Shape::new(&constrained, &accuracy, None).unwrap();
-    assert_eq!(
-        shape.choice().words(),
-        "the processor, 64 bits: interface nodes are constrained"
-    );
-    accuracy.multiply = Multiply::Gpu;
-    let error = Shape::new(&constrained, &accuracy, None)
-        .err()
-        .unwrap()
-        .to_string();
-    assert!(error.contains("constrained"), "{error}");
 }

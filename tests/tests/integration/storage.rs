@@ -7,7 +7,7 @@ use contact::tool::Tool;
 use glamx::DPose3;
 use snapin::engine::{ContactPart, Engine};
 use snapin::prepare::{ColumnChoice, PreparedCompliance, PreparedPart};
-use snapin::scene::{Adaptive, Columns, FreeNodes, PMethod, Scalar, Scene};
+use snapin::scene::{Adaptive, Columns, FreeNodes, Scalar, Scene};
 use snapin::setup;
 use snapin::stored::{Blocks, Source};
 use snapin_tests::{arg, csv, root, snapin};
@@ -203,11 +203,6 @@ fn the_p_method_has_all_columns() {
         setup::part_spec(&scene).unwrap().columns,
         ColumnChoice::Near
     );
-    for method in [PMethod::Select, PMethod::Constrain] {
-        scene.accuracy.adaptive = Adaptive::On {
-            method,
-            free: FreeNodes::Radius(1e-3),
-        };
-        assert_eq!(setup::part_spec(&scene).unwrap().columns, ColumnChoice::All);
-    }
+    scene.accuracy.adaptive = Adaptive::On(FreeNodes::Radius(1e-3));
+    assert_eq!(setup::part_spec(&scene).unwrap().columns, ColumnChoice::All);
 }

@@ -186,9 +186,6 @@ fn features_that_are_not_there_are_an_error_that_says_so() {
          use \"auto\" or leave the key out"
     );
     assert!(error.contains(&wanted), "{error}");
-    let (error, _) =
-        with("tool_features = \"on\"\nadaptive = { method = \"constrain\", radius = 1.0 }");
-    assert!(error.contains("does not go with"), "{error}");
 }
 
 /// A corner, a blade across the whole width, a box with its flat side on the ramp and the rim of a cylinder go all the way

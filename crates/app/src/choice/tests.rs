@@ -97,9 +97,14 @@ fn without_an_adapter_auto_is_the_processor_and_gpu_an_error_that_names_what_was
 fn gpu_is_the_best_adapter_with_the_processor_behind_it() {
     let blocks = blocks();
     let exact = product(
-        &mut on_processor(layout(), &[&blocks], MultiplyScalar::F64, Why::Asked)
-            .unwrap()
-            .0,
+        &mut choose(
+            layout(),
+            &[&blocks],
+            &accuracy(Multiply::Cpu, MultiplyScalar::F64),
+            None,
+        )
+        .unwrap()
+        .0,
     );
     for (scalar, bits, bound) in [
         (MultiplyScalar::Auto, 32, 1e-5),

@@ -144,18 +144,6 @@ impl Clusters {
         }
     }
 
-    /// Takes these bounds on the norm of any block in a candidate's column instead, m/N.
-    pub(super) fn bound_by(&mut self, bounds: &[f64]) {
-        let n = self.len();
-        for b in 0..n {
-            let of_members = self.members_of(b).iter().map(|j| bounds[*j as usize]);
-            let bound = of_members.fold(0.0, f64::max);
-            self.largest[b * n..][..n].fill(rounded_up(bound));
-            self.columns[b * n..][..n].fill(rounded_up(bound));
-            self.rows[b * n..][..n].fill(rounded_up(2.0 * bound));
-        }
-    }
-
     /// Number of clusters.
     pub(super) fn len(&self) -> usize {
         self.middles.len()

@@ -49,11 +49,6 @@ impl Pairs {
         self.hand = 0;
     }
 
-    /// Candidates by slot.
-    pub(super) fn known(&self) -> &[u32] {
-        &self.known
-    }
-
     pub(super) fn slot(&self, candidate: u32) -> Option<usize> {
         let slot = self.slot_of[candidate as usize];
         (slot != NONE).then_some(slot as usize)
@@ -64,17 +59,10 @@ impl Pairs {
         self.capacity - self.known.len()
     }
 
-    /// Adds a candidate; `block_with(slot, i)` is the block of a known candidate, or itself, and it.
-    pub(super) fn push(&mut self, candidate: u32, block_with: impl Fn(usize, u32) -> DMat3) {
-        let slot = self.known.len();
-        self.known.push(candidate);
-        self.put(slot, candidate, block_with);
-    }
-
-    fn put(&mut self, slot: usize, candidate: u32, block_with: impl Fn(usize, u32) -> DMat3) {
+    fn put(&mut self, slot: usize, candidate: u32, part: &ContactPart) {
         self.slot_of[candidate as usize] = slot as u32;
         for (k, i) in self.known.iter().enumerate() {
-            let block = block_with(k, *i);
+            let block = part.block(*i as usize, candidate as usize);
             self.blocks[slot * self.capacity + k] = block;
             self.blocks[k * self.capacity + slot] = block.transpose();
         }
@@ -114,9 +102,7 @@ impl Pairs {
                 self.hand
             };
             self.asked_at[slot] = self.now;
-            self.put(slot, candidate, |_, i| {
-                part.block(i as usize, candidate as usize)
-            });
+            self.put(slot, candidate, part);
         }
         true
     }
@@ -140,17 +126,6 @@ impl Pairs {
     #[inline]
     pub(super) fn at(&self, i: usize, j: usize) -> &DMat3 {
         &self.blocks[j * self.capacity + i]
-    }
-
-    /// Makes all blocks anew.
-    pub(super) fn refill(&mut self, block: impl Fn(u32, u32) -> DMat3) {
-        for j in 0..self.known.len() {
-            for i in 0..=j {
-                let block = block(self.known[i], self.known[j]);
-                self.blocks[j * self.capacity + i] = block;
-                self.blocks[i * self.capacity + j] = block.transpose();
-            }
-        }
     }
 }
 

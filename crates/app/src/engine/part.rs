@@ -10,7 +10,6 @@ use glam::{DMat3, DVec3};
 
 use super::ActiveContact;
 use super::clusters::Clusters;
-use super::constrained::Constrained;
 use super::fetched::{FetchedColumns, norm_squared};
 use super::pairs::Pairs;
 use crate::stored::{Blocks, Source};
@@ -228,21 +227,6 @@ impl ContactPart {
         matches!(self.columns, Columns::Fetched { .. })
     }
 
-    /// Takes other bounds on the norms of the blocks, m/N by candidate: those of a compliance that
-    /// this one is only a share of.
-    pub(super) fn bounded_by(mut self, others: &[f64]) -> Self {
-        assert_eq!(
-            others.len(),
-            self.rest.len(),
-            "one bound for each candidate"
-        );
-        if let Columns::All { largest, .. } = &mut self.columns {
-            largest.copy_from_slice(&others[..self.n_compliant]);
-        }
-        self.clusters.bound_by(others);
-        self
-    }
-
     /// Number of candidate nodes.
     pub fn n_candidates(&self) -> usize {
         self.rest.len()
@@ -326,9 +310,7 @@ impl ContactPart {
 pub(super) struct Deformed<'a> {
     pub(super) part: &'a ContactPart,
     pub(super) active: &'a [ActiveContact],
-    /// Where interface nodes are constrained, `part` is the coarse one.
-    pub(super) constrained: Option<&'a Constrained>,
-    /// Blocks that lie side by side; of the part alone, not used where it is constrained.
+    /// Blocks that lie side by side.
     pub(super) pairs: &'a Pairs,
 }
 
@@ -336,24 +318,14 @@ impl Deformed<'_> {
     /// Displacement of candidate `i`, m.
     #[inline]
     pub(super) fn displacement(&self, i: usize) -> DVec3 {
-        match self.constrained {
-            None => {
-                let kept = self.pairs.slot(i as u32);
-                kept.and_then(|slot| self.pairs.displacement(slot, self.active))
-                    .unwrap_or_else(|| self.part.displacement(i, self.active))
-            }
-            Some(constrained) => constrained.displacement(i, self.part, self.active),
-        }
+        let kept = self.pairs.slot(i as u32);
+        kept.and_then(|slot| self.pairs.displacement(slot, self.active))
+            .unwrap_or_else(|| self.part.displacement(i, self.active))
     }
 
     /// Upper bound on the displacement of any candidate, m.
     pub(super) fn displacement_bound(&self) -> f64 {
         self.part.displacement_bound(self.active)
-    }
-
-    /// Full switches of the compliance since the start, each no more than all of it.
-    pub(super) fn switched(&self) -> f64 {
-        self.constrained.map_or(0.0, Constrained::switched)
     }
 }
 

@@ -30,26 +30,13 @@ impl Engine {
         let near_distance = self.settings.near_distance;
 
         // Which candidates can be near.
-        let constrained = self.constrained.as_deref();
-        let state = state_of(part, tool, tool_pose, &self.scratch, constrained);
-        let asks = self.watch.advance(state);
-        if let (true, Some(constrained)) = (asks, &mut self.constrained) {
-            constrained.make_terms(&self.scratch.active);
-        }
-        let constrained = self.constrained.as_deref();
-        let state = state_of(part, tool, tool_pose, &self.scratch, constrained);
+        let state = state_of(part, tool, tool_pose, &self.scratch);
+        self.watch.advance(state);
         self.watch.look(state);
         let candidates = self.watch.take_due();
-        if let Some(constrained) = &mut self.constrained {
-            let active = &self.scratch.active;
-            if !constrained.ensure(candidates.iter().copied(), active, part) {
-                constrained.make_terms(active);
-            }
-        }
         clock.lap(Stage::Proximity, report);
 
         // One plane per near node, at its displaced position (paper, Fig. 3).
-        let constrained = self.constrained.as_deref();
         let Scratch {
             planes,
             active,
@@ -60,7 +47,6 @@ impl Engine {
         let deformed = Deformed {
             part,
             active,
-            constrained,
             pairs,
         };
         let position_of = |candidate: u32| {
@@ -93,7 +79,6 @@ impl Engine {
             let deformed = Deformed {
                 part,
                 active,
-                constrained,
                 pairs,
             };
             let position_of = |candidate: u32| {
@@ -127,7 +112,6 @@ impl Engine {
             let deformed = Deformed {
                 part,
                 active,
-                constrained,
                 pairs,
             };
             let mut positions = Positions { deformed, known };
@@ -187,16 +171,12 @@ impl Engine {
             let w = &mut w_matrix[..m * m];
             let patches = prune.patches_mut();
             let candidates = planes.iter().map(|plane| plane.candidate);
-            let assembled = match (&mut self.constrained, &mut self.edges) {
-                (None, Some(edges)) => edges.delassus_into(pairs, part, planes, coupling, w),
-                (None, None) if pairs.ensure(candidates.clone(), part) => {
+            let assembled = match &mut self.edges {
+                Some(edges) => edges.delassus_into(pairs, part, planes, coupling, w),
+                None if pairs.ensure(candidates.clone(), part) => {
                     assemble(&*pairs, planes, patches, coupling, w)
                 }
-                (None, None) => assemble(part, planes, patches, coupling, w),
-                (Some(constrained), _) => {
-                    constrained.ensure(candidates, &[], part);
-                    assemble(constrained.blocks(), planes, patches, coupling, w)
-                }
+                None => assemble(part, planes, patches, coupling, w),
             };
             debug_assert!(assembled.is_ok(), "the matrix has the size of the planes");
         }
@@ -213,9 +193,6 @@ impl Engine {
 
         // Forces of the near nodes become the state; the tool goes where its coupling balances.
         self.scratch.adopt_forces();
-        if let Some(constrained) = &mut self.constrained {
-            constrained.forget_terms();
-        }
         let Scratch { planes, z, .. } = &self.scratch;
         let (mut force, mut torque) = wrench_on_tool(planes, z, reference);
         if let Some(edges) = &mut self.edges {
@@ -247,15 +224,12 @@ impl Engine {
         let deformed = Deformed {
             part,
             active,
-            constrained: self.constrained.as_deref(),
             pairs,
         };
         known.forget();
         for (plane, before) in planes.iter().zip(u_before.iter()) {
             let u = deformed.displacement(plane.candidate as usize);
-            if deformed.constrained.is_none() {
-                known.set(plane.candidate as usize, u);
-            }
+            known.set(plane.candidate as usize, u);
             change = change.max((u - *before).length());
         }
         if let Some(edges) = &self.edges {
@@ -285,7 +259,6 @@ impl Engine {
         let deformed = Deformed {
             part: self.part.as_ref(),
             active,
-            constrained: self.constrained.as_deref(),
             pairs,
         };
         let motion_of = |plane: &Plane| {

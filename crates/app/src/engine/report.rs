@@ -4,7 +4,7 @@ use glam::DVec3;
 use glamx::DPose3;
 
 /// Number of [`Stage`]s.
-pub const N_STAGES: usize = 6;
+pub const N_STAGES: usize = 5;
 
 /// The stages of a step, in their order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,9 +19,6 @@ pub enum Stage {
     Lcp,
     /// Contact forces to displacements of the near nodes, and the tool's pose.
     Update,
-    /// Before the others: which interface nodes of a constrained part are free, and the operator of
-    /// a new choice. Nothing where all are free.
-    FreeNodes,
 }
 
 impl Stage {
@@ -32,13 +29,11 @@ impl Stage {
         Self::Delassus,
         Self::Lcp,
         Self::Update,
-        Self::FreeNodes,
     ];
 
     /// Name in tables and files.
     pub fn name(self) -> &'static str {
         match self {
-            Self::FreeNodes => "free_nodes",
             Self::Proximity => "proximity",
             Self::Planes => "planes",
             Self::Delassus => "delassus",
@@ -102,13 +97,6 @@ pub struct StepReport {
     pub lcp_solved: bool,
     /// Whether the planes stood still at the end (always true for a fixed number of passes).
     pub converged: bool,
-    /// Interface nodes that are free in a constrained part; 0 where all are.
-    pub free_nodes: u32,
-    /// N, change of the wrench by switching free nodes in this step, at the pose of the last step
-    /// (torques made comparable by the tool's reach).
-    pub switch_change: f64,
-    /// Whether that change was let pass above its bound, because no smaller one was possible.
-    pub switch_forced: bool,
     /// Whether the target pose was refused (not finite, or no unit quaternion).
     pub rejected: bool,
     /// Nanoseconds by [`Stage`].
@@ -136,9 +124,6 @@ impl StepReport {
             certificate: 0.0,
             lcp_solved: true,
             converged: true,
-            free_nodes: 0,
-            switch_change: 0.0,
-            switch_forced: false,
             rejected: false,
             stage_ns: [0; N_STAGES],
         }

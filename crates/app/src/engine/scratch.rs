@@ -52,10 +52,6 @@ pub(super) struct Scratch {
     /// The first of them carry force of a plane of their own.
     pub(super) n_own: usize,
     lcp: lcp::Scratch,
-    /// Contacts set aside while another operator is tried.
-    saved: Vec<ActiveContact>,
-    /// Rest positions of what is in contact, for the choice of free nodes, m.
-    pub(super) centres: Vec<DVec3>,
 }
 
 impl Scratch {
@@ -87,8 +83,6 @@ impl Scratch {
             active: Vec::with_capacity(near),
             n_own: 0,
             lcp: lcp::Scratch::new(max_rows),
-            saved: Vec::with_capacity(near),
-            centres: Vec::with_capacity(n_candidates),
             planes,
         }
     }
@@ -96,11 +90,6 @@ impl Scratch {
     /// Rows of the contact problem that there is memory for.
     pub(super) fn max_rows(&self) -> usize {
         self.max_rows
-    }
-
-    /// Near nodes that there is memory for.
-    pub(super) fn max_near(&self) -> usize {
-        self.q.len()
     }
 
     /// Rows of the contact problem of these planes, which are put in the order of their patches where they share rows.
@@ -112,26 +101,6 @@ impl Scratch {
             clusters,
             length,
         )
-    }
-
-    /// Sets the contacts aside.
-    pub(super) fn save_contacts(&mut self) {
-        self.saved.clear();
-        self.saved.extend_from_slice(&self.active);
-    }
-
-    /// Takes the contacts back that were set aside.
-    pub(super) fn restore_contacts(&mut self) {
-        for contact in &self.active {
-            self.was_active[contact.candidate as usize] = false;
-        }
-        self.active.clear();
-        self.active.extend_from_slice(&self.saved);
-        for contact in &self.active {
-            self.was_active[contact.candidate as usize] = true;
-        }
-        self.n_own = self.active.len();
-        self.known.forget();
     }
 
     pub(super) fn clear_contacts(&mut self) {

@@ -55,7 +55,6 @@ pub(super) struct Watch {
     /// Clusters to visit in this look.
     visits: Vec<u32>,
     due: Vec<u32>,
-    watched: Vec<u32>,
     /// m, beyond reach: what may come near within some steps.
     slack: f64,
     reach: f64,
@@ -63,7 +62,6 @@ pub(super) struct Watch {
     /// By candidate: force at the last look, N.
     force_then: Vec<DVec3>,
     active_then: Vec<u32>,
-    switched_then: f64,
     /// By cluster: what the forces on its members do in this look; zero but for those in `loaded`.
     loads: Vec<Load>,
     loaded: Vec<u32>,
@@ -146,13 +144,11 @@ impl Watch {
             middle_seen: vec![Seen::NEVER; n_clusters],
             visits: Vec::with_capacity(n_clusters),
             due: Vec::with_capacity(rest.len()),
-            watched: Vec::with_capacity(rest.len()),
             slack,
             reach,
             pose_then: None,
             force_then: vec![DVec3::ZERO; rest.len()],
             active_then: Vec::with_capacity(rest.len()),
-            switched_then: 0.0,
             loads: vec![Load::default(); n_clusters],
             loaded: Vec::with_capacity(n_clusters),
             radius: distances.fold(0.0, f64::max),
@@ -165,9 +161,8 @@ impl Watch {
         self.pose_then = None;
     }
 
-    /// Adds up the motion since the last look. Whether [`Self::look`], which has to follow, will ask for displacements.
-    pub(super) fn advance(&mut self, state: State<'_>) -> bool {
-        let clusters = state.deformed.part.clusters();
+    /// Adds up the motion since the last look; [`Self::look`] has to follow.
+    pub(super) fn advance(&mut self, state: State<'_>) {
         self.sum_loads(state);
         match self.pose_then {
             Some(then) => self.add_motion(&then, state),
@@ -186,10 +181,6 @@ impl Watch {
             sums.filter(|(_, (by_force, at))| is_due(**by_force, **at))
                 .map(|(c, _)| c as u32),
         );
-        self.visits.iter().any(|c| {
-            let due_at = &self.due_at[clusters.range(*c as usize)];
-            self.is_whole(*c as usize, due_at)
-        })
     }
 
     /// Finds the candidates that may be nearer than reach: [`Self::take_due`]. Does not allocate.
@@ -227,34 +218,6 @@ impl Watch {
         let sure_at = self.by_force[c];
         self.due_at[place] = self.by_tool + self.by_force[c] + (distance - self.reach);
         self.seen[place] = Seen { at, sure_at };
-    }
-
-    /// Candidates that may come near within some steps: those that are near, and more.
-    pub(super) fn watched(&mut self, state: State<'_>) -> &[u32] {
-        self.watched.clear();
-        if self.pose_then.is_none() {
-            return &self.watched;
-        }
-        let part = state.deformed.part;
-        let clusters = part.clusters();
-        let is_free = state.deformed.active.is_empty();
-        for c in 0..clusters.len() {
-            let limit = self.by_tool + self.by_force[c] + self.slack;
-            if self.visit_at[c] > limit {
-                continue;
-            }
-            for place in clusters.range(c) {
-                let candidate = clusters.members()[place];
-                // Where nothing is deformed the true distance costs little.
-                let rest = part.rest_positions()[candidate as usize];
-                let is_far = self.due_at[place] > limit
-                    || (is_free && distance_bound(state, rest) > self.reach + self.slack);
-                if !is_far {
-                    self.watched.push(candidate);
-                }
-            }
-        }
-        &self.watched
     }
 
     /// Candidates that may be nearer than `distance` (m, at least the reach), by the appointments of the last look;
@@ -326,22 +289,16 @@ impl Watch {
     fn add_motion(&mut self, then: &DPose3, state: State<'_>) {
         let clusters = state.deformed.part.clusters();
         let by_tool = self.motion_bound(then, state);
-        let by_switch = self.switch_bound(state);
         let changes: f64 = self
             .loaded
             .iter()
             .map(|b| self.loads[*b as usize].changes)
             .sum();
-        if !(by_tool + by_switch + changes).is_finite() {
+        if !(by_tool + changes).is_finite() {
             self.begin();
             return;
         }
         self.by_tool += by_tool + ROUNDING * self.by_tool;
-        if by_switch > 0.0 {
-            for sum in &mut self.by_force {
-                *sum += by_switch + ROUNDING * *sum;
-            }
-        }
         for &b in &self.loaded {
             let Load {
                 change, changes, ..
@@ -377,7 +334,6 @@ impl Watch {
             self.call(clusters, contact.candidate);
         }
         self.pose_then = Some(*state.tool_pose);
-        self.switched_then = state.deformed.switched();
     }
 
     /// Makes a candidate due.
@@ -487,19 +443,6 @@ impl Watch {
             + self.radius
             + state.deformed.displacement_bound();
         shift + turn * lever
-    }
-
-    /// Bound on how far any candidate was moved by a change of the compliance itself, m: by no more than all of it
-    /// while free nodes are switched.
-    fn switch_bound(&self, state: State<'_>) -> f64 {
-        let switched = (state.deformed.switched() - self.switched_then).min(1.0);
-        if switched <= 0.0 {
-            return 0.0;
-        }
-        let part = state.deformed.part;
-        let then = self.active_then.iter();
-        let by_force = then.map(|c| part.largest_block(*c) * self.force_then[*c as usize].length());
-        by_force.sum::<f64>() * switched
     }
 }
 

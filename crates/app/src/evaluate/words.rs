@@ -2,7 +2,6 @@
 
 use super::Story;
 use crate::effects::Verdict;
-use crate::engine::MOST_FREE;
 use crate::prepare::PreparedCompliance;
 use crate::prepare::budget::bytes;
 use crate::scene::{Guide, ToolShape};
@@ -264,23 +263,6 @@ impl Story<'_> {
                 two.log.beyond_margin,
             ));
         }
-        let records = &self.driven.recording.records;
-        if self.prepared.bubbles.is_some() {
-            let most_free = records.iter().map(|r| r.report.free_nodes).max();
-            let switched = records.iter().map(|r| r.report.switch_change);
-            notes.push(format!(
-                "The part's interface nodes are constrained (p-method \"constrain\"), up to {} of them were \
-                 free: it is stiffer than at its full order, at every moment. Freeing and constraining \
-                 changed the wrench by {:.1e} N in a step at most. Pictures show the constrained part.",
-                most_free.unwrap_or(0),
-                switched.fold(0.0, f64::max),
-            ));
-            if most_free == Some(MOST_FREE as u32) {
-                notes.push(format!(
-                    "No more than {MOST_FREE} interface nodes are free at a time; the choice asked for more."
-                ));
-            }
-        }
         notes
     }
 }
@@ -332,10 +314,6 @@ fn of_steps(recording: &Recording, of: &str) -> Vec<String> {
             count(&|r| r.report.merged_badly),
             " with near nodes beyond accuracy.max_contacts whose shared rows may be wrong by more than \
              accuracy.merge_tolerance",
-        ),
-        (
-            count(&|r| r.report.switch_forced),
-            " in which freeing or constraining nodes changed the wrench beyond its bound",
         ),
     ];
     counted(all, of)

@@ -71,9 +71,6 @@ pub(super) fn checked(
         if peak <= 0.0 {
             return Ok(Peak::Unknown("nothing resisted".to_owned()));
         }
-        if prepared.bubbles.is_some() {
-            return Ok(Peak::Unknown("interface nodes are constrained".to_owned()));
-        }
         match peak_at(scene, order, affordable, options) {
             Err(e) if e.is_interrupt() => Err(e),
             Err(e) => Ok(Peak::Unknown(e.to_string())),

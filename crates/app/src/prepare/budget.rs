@@ -76,8 +76,8 @@ impl Forecast {
         match loaded.spec.columns {
             ColumnChoice::All => false,
             ColumnChoice::Near => true,
-            // What constrains or interpolates nodes needs all.
-            ColumnChoice::Auto => loaded.spec.bubbles.is_none() && !fits(),
+            // What interpolates nodes needs all.
+            ColumnChoice::Auto => !fits(),
         }
     }
 
@@ -202,7 +202,6 @@ mod tests {
             length_scale: 1.0,
             order: Some(2),
             refinements: 0,
-            bubbles: None,
             columns: ColumnChoice::All,
             contact_scalar: Scalar::F64,
             material: Material::new(2.7e9, 0.35).unwrap(),

@@ -34,13 +34,6 @@ impl Interior {
         let Some(number) = spec.interior_order.filter(|number| *number != own) else {
             return Ok(None);
         };
-        if spec.bubbles.is_some() {
-            return Err(Error::Input(format!(
-                "{}: part.interior_order = {number} does not go with accuracy.adaptive's method \"constrain\", which \
-                 constrains the nodes of the surface's order; leave one of the two out",
-                path.display()
-            )));
-        }
         let order = Order::try_from_number(number);
         let Some(order) =
             order.filter(|order| *order as u8 > own && (*order as u8).is_multiple_of(own))

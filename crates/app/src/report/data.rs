@@ -13,17 +13,10 @@ use super::strain::StrainFacts;
 use super::summary::Percentiles;
 
 /// Number of timed stages in a step; see [`STAGE_NAMES`].
-pub const N_STAGES: usize = 6;
+pub const N_STAGES: usize = 5;
 
 /// The timed stages of a step in their order, as they are called in tables and files.
-pub const STAGE_NAMES: [&str; N_STAGES] = [
-    "proximity",
-    "planes",
-    "delassus",
-    "lcp",
-    "update",
-    "free_nodes",
-];
+pub const STAGE_NAMES: [&str; N_STAGES] = ["proximity", "planes", "delassus", "lcp", "update"];
 
 /// Everything that one run tells.
 #[derive(Clone, Debug)]

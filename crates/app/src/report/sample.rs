@@ -45,7 +45,6 @@ pub(super) fn rows() -> Vec<StepRow> {
             800 + jitter,
             1_500 + 5 * jitter,
             400 + jitter,
-            300 + jitter,
         ];
         rows.push(StepRow {
             step,

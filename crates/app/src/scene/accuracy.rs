@@ -18,10 +18,6 @@ pub struct Accuracy {
     pub contact_iterations: ContactIterations,
     /// Candidates nearer than this get a contact plane, m, > 0; `None`: chosen by the program.
     pub near_distance: Option<f64>,
-    /// Largest scaled residual of the contact solution, in [1e-15, 1e-2].
-    pub lcp_tolerance: f64,
-    /// Rounds of pivoting in one contact problem; `None`: as many as it takes.
-    pub lcp_rounds: Option<usize>,
     /// Rows of one contact problem; more near nodes than that share rows.
     pub max_contacts: usize,
     /// Whether the haptic loop solves whole steps.
@@ -62,8 +58,6 @@ impl Accuracy {
             adaptive: Adaptive::Off,
             contact_iterations: ContactIterations::Converged,
             near_distance: None,
-            lcp_tolerance: raw::default::LCP_TOLERANCE,
-            lcp_rounds: None,
             max_contacts: raw::default::MAX_CONTACTS as usize,
             rates: Rates::Auto,
             tool_features: ToolFeatures::Auto,
@@ -73,26 +67,17 @@ impl Accuracy {
             columns: Columns::Auto,
             multiply: Multiply::Auto,
         };
-        let draw = |free| Adaptive::On {
-            method: PMethod::Select,
-            free,
-        };
         match preset {
             Some(Preset::Fast) => Self {
-                adaptive: draw(FreeNodes::Radius(0.0)),
+                adaptive: Adaptive::On(FreeNodes::Radius(0.0)),
                 contact_iterations: ContactIterations::Times(2),
-                lcp_tolerance: 1e-6,
                 ..plain
             },
             Some(Preset::Balanced) => Self {
-                adaptive: draw(FreeNodes::Indicator(SEEN_BEND)),
+                adaptive: Adaptive::On(FreeNodes::Indicator(SEEN_BEND)),
                 ..plain
             },
-            Some(Preset::Exact) => Self {
-                lcp_tolerance: 1e-13,
-                ..plain
-            },
-            None => plain,
+            Some(Preset::Exact) | None => plain,
         }
     }
 }
@@ -122,10 +107,9 @@ impl Accuracy {
             Rates::Every(n) => format!(", results {n} periods later"),
         };
         format!(
-            "{}{planes}, interface nodes {}, LCP to {:e}, contact in {contact}{shape}{rates}",
+            "{}{planes}, interface nodes {}, contact in {contact}{shape}{rates}",
             preset.unwrap_or_default(),
             self.adaptive.words(),
-            self.lcp_tolerance,
         )
     }
 }
@@ -133,18 +117,14 @@ impl Accuracy {
 impl Adaptive {
     /// In a few words, lengths in mm.
     pub fn words(&self) -> String {
-        let Self::On { method, free } = self else {
+        let Self::On(free) = self else {
             return "all free".to_owned();
         };
-        let which = match free {
+        match free {
             FreeNodes::Radius(0.0) => "none free".to_owned(),
             FreeNodes::Radius(radius) => format!("free within {:.3} mm", 1e3 * radius),
             FreeNodes::Indicator(share) => format!("free where bent by {} %", 100.0 * share),
             FreeNodes::BudgetUs(budget) => format!("free as {budget} µs allow"),
-        };
-        match method {
-            PMethod::Select => format!("{which} (select)"),
-            PMethod::Constrain => format!("{which} (constrain)"),
         }
     }
 }
@@ -209,22 +189,8 @@ pub enum Adaptive {
     /// Every interface node is free.
     #[default]
     Off,
-    /// Some are.
-    On {
-        /// How the others follow.
-        method: PMethod,
-        /// Which are free.
-        free: FreeNodes,
-    },
-}
-
-/// How constrained interface nodes follow their principal nodes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PMethod {
-    /// Forces and free nodes as at full order; the others are interpolated for drawing.
-    Select,
-    /// Galerkin's method on principal and free nodes: a stiffer part.
-    Constrain,
+    /// Some are; the others are interpolated for drawing. Forces are those of the full order.
+    On(FreeNodes),
 }
 
 /// Which interface nodes are free.
@@ -279,6 +245,6 @@ pub enum Multiply {
     Auto,
     /// On the processor.
     Cpu,
-    /// On a GPU, or not at all. Not with 64-bit numbers, fetched columns or a constrained part.
+    /// On a GPU, or not at all. Not with 64-bit numbers or fetched columns.
     Gpu,
 }

@@ -16,7 +16,7 @@ mod words;
 use super::error::SceneError;
 use super::{DeviceModel, Guide, Handle, QuadratureRule, Start, StrainUse, Units};
 pub(super) use accuracy::{
-    AccuracyKeys, AccuracyRaw, AdaptiveKeys, AdaptiveRaw, IterationsRaw, MethodRaw, MultiplyRaw,
+    AccuracyKeys, AccuracyRaw, AdaptiveKeys, AdaptiveRaw, IterationsRaw, MultiplyRaw,
     MultiplyScalarRaw, PresetRaw, RatesRaw, ScalarRaw, ToolFeaturesRaw,
 };
 pub(super) use groups::{FixedRaw, NamesRaw};
@@ -31,7 +31,6 @@ pub(super) mod default {
     pub(crate) const COUPLING_TRANSLATIONAL_STIFFNESS: f64 = 1e4;
     pub(crate) const COUPLING_ROTATIONAL_STIFFNESS: f64 = 20.0;
     pub(crate) const SERVO_PERIOD: f64 = 1e-3;
-    pub(crate) const LCP_TOLERANCE: f64 = 1e-10;
     pub(crate) const MAX_CONTACTS: i64 = 500;
     pub(crate) const MERGE_TOLERANCE: f64 = 0.05;
     pub(crate) const FRAMES: i64 = 6;

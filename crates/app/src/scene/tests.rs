@@ -108,10 +108,7 @@ fn scene_has_what_is_written_and_the_defaults() {
         scene.accuracy.contact_iterations,
         ContactIterations::Converged
     );
-    assert_eq!(
-        (scene.accuracy.lcp_tolerance, scene.accuracy.max_contacts),
-        (1e-10, 500)
-    );
+    assert_eq!(scene.accuracy.max_contacts, 500);
     assert_eq!(scene.effects, Effects::default());
     assert_eq!(
         scene.output,
@@ -465,7 +462,7 @@ fn refusals_name_line_key_and_mend() {
             "clip.toml:22: adaptive has no choice `on`; the nearest is `off`, all are `off`",
         ),
         (
-            adding("[accuracy]\nadaptive = { method = \"select\" }\n"),
+            adding("[accuracy]\nadaptive = {}\n"),
             "clip.toml:22: adaptive says nothing of which nodes are free; write radius, indicator or budget_us",
         ),
         (
@@ -493,24 +490,12 @@ fn refusals_name_line_key_and_mend() {
             "clip.toml:22: rates.every 30 periods of 0.002 s are 0.06 s, more than 0.05 s; write 25 or less",
         ),
         (
-            adding(
-                "[accuracy]\nadaptive = { method = \"constrain\", radius = 1.0 }\nrates = { every = 2 }\n",
-            ),
-            "clip.toml:23: rates.every does not go with adaptive method \"constrain\"; leave one of the two out, or write method = \"select\"",
-        ),
-        (
             adding("[accuracy]\nmultiply = \"gpu\"\nscalar = \"f64\"\n"),
             "clip.toml:23: scalar \"f64\" does not go with multiply \"gpu\", which keeps 32 or 16 bits; write scalar = \"f32\" or \"f16\" or leave it out, or write multiply = \"cpu\"",
         ),
         (
             adding("[accuracy]\ncolumns = \"near\"\nmultiply = \"gpu\"\n"),
             "clip.toml:22: columns \"near\" does not go with multiply \"gpu\", which needs the whole compliance; leave one of the two out",
-        ),
-        (
-            adding(
-                "[accuracy]\nadaptive = { method = \"constrain\", radius = 1.0 }\nmultiply = \"gpu\"\n",
-            ),
-            "clip.toml:23: multiply \"gpu\" does not go with adaptive method \"constrain\"; leave one of the two out, or write method = \"select\"",
         ),
         (
             adding("[accuracy]\nmultiply = \"opencl\"\n"),
@@ -527,10 +512,6 @@ fn refusals_name_line_key_and_mend() {
         (
             adding("[accuracy]\ncontact_iterations = \"convergd\"\n"),
             "clip.toml:22: contact_iterations has no choice `convergd`; the nearest is `converged`",
-        ),
-        (
-            adding("[accuracy]\nlcp_tolerance = 1e-20\n"),
-            "clip.toml:22: lcp_tolerance 1e-20 is not between 1e-15 and 1e-2; 1e-10 is safe with 64-bit numbers",
         ),
         (
             adding("[accuracy]\nmax_contacts = 100000\n"),
@@ -660,20 +641,15 @@ fn adaptive_is_off_a_radius_or_a_table() {
         let text = format!("units = \"mm-N-MPa\"\naccuracy.adaptive = {value}\n{CLIP}");
         read(text).unwrap().accuracy.adaptive
     };
-    let on = |method, free| Adaptive::On { method, free };
     assert_eq!(adaptive("\"off\""), Adaptive::Off);
-    assert_eq!(adaptive("2"), on(PMethod::Select, FreeNodes::Radius(2e-3)));
-    assert_eq!(
-        adaptive("{ method = \"constrain\", radius = 0.5 }"),
-        on(PMethod::Constrain, FreeNodes::Radius(0.5e-3))
-    );
+    assert_eq!(adaptive("2"), Adaptive::On(FreeNodes::Radius(2e-3)));
     assert_eq!(
         adaptive("{ indicator = 0.01 }"),
-        on(PMethod::Select, FreeNodes::Indicator(0.01))
+        Adaptive::On(FreeNodes::Indicator(0.01))
     );
     assert_eq!(
         adaptive("{ budget_us = 50 }"),
-        on(PMethod::Select, FreeNodes::BudgetUs(50.0))
+        Adaptive::On(FreeNodes::BudgetUs(50.0))
     );
 }
 

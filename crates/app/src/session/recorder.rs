@@ -3,7 +3,6 @@
 use std::time::Instant;
 
 use device::{HandleState, Script, ServoReport, Simulated, Wrench};
-use glam::DVec3;
 use glamx::DPose3;
 
 use super::fast::Tick;
@@ -93,11 +92,6 @@ impl<'a> Recorder<'a> {
         };
         self.recording
             .push(&entry, &self.spec.held, &solved.report, contacts);
-    }
-
-    /// Adds the free interface nodes of a constrained part to the last record.
-    pub(super) fn push_bubbles(&mut self, amplitudes: &[(u32, DVec3)]) {
-        self.recording.push_bubbles(amplitudes);
     }
 
     /// What the display would do between two steps, and its time, ns.

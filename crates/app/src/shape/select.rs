@@ -7,9 +7,9 @@ use fem::{Hierarchy, Rule as Following};
 use glam::DVec3;
 use gpu::{ComplianceMultiply, Layout};
 
+use super::free_nodes::{FreeNodes, Rule};
 use crate::Error;
 use crate::choice::{Choice, Multiplier};
-use crate::free_nodes::{FreeNodes, Rule};
 use crate::prepare::PreparedPart;
 use crate::scene;
 use crate::stored::StoredCompliance;

@@ -27,12 +27,7 @@ struct Ready {
 }
 
 /// Ways of keeping the compliance, as keys of `[accuracy]`.
-const WAYS: [&str; 4] = [
-    "",
-    "columns = \"near\"",
-    "contact_scalar = \"f32\"",
-    "adaptive = { method = \"constrain\", radius = 0.004 }",
-];
+const WAYS: [&str; 3] = ["", "columns = \"near\"", "contact_scalar = \"f32\""];
 
 fn ready(folder: &Path) -> Vec<Ready> {
     let mut ready = Vec::new();
@@ -40,11 +35,6 @@ fn ready(folder: &Path) -> Vec<Ready> {
         let mesh = format!("{}.msh", case.name);
         std::fs::write(folder.join(&mesh), &case.msh).unwrap();
         for (k, way) in WAYS.iter().enumerate() {
-            // Linear elements have no interface nodes to constrain.
-            let is_linear = !case.keys.contains("order") || case.keys.contains("order = 1");
-            if way.contains("constrain") && is_linear {
-                continue;
-            }
             ready.push(prepared(folder, &case, &mesh, way, k));
         }
     }
@@ -213,7 +203,7 @@ fn engine(random: &mut Random, ready: &Ready, tool: &Tool) -> Result<Engine, Str
     scene.accuracy.tool_features = random.pick(&[ToolFeatures::Auto, ToolFeatures::Off]);
     scene.coupling.translational_stiffness = random.decades(1e2, 1e7);
     let settings = settings(random, tool, ready.size);
-    if ready.prepared.bubbles.is_some() || random.chance(0.5) {
+    if random.chance(0.5) {
         scene.accuracy.near_distance = Some(settings.near_distance);
         scene.accuracy.max_contacts = settings.max_contacts;
         scene.accuracy.contact_iterations = match settings.contact_iterations {
@@ -275,7 +265,7 @@ fn run(random: &mut Random, ready: &Ready, meshes: &[Arc<Mesh>]) -> Result<u32, 
         Err(why) if why.contains("near_distance") => return Ok(0),
         Err(why) => return Err(why),
     };
-    let two_rates = random.chance(0.2) && !engine.has_edges() && !engine.is_constrained();
+    let two_rates = random.chance(0.2) && !engine.has_edges();
     if two_rates {
         return two_rates_run(random, &mut engine, &path);
     }
@@ -323,13 +313,9 @@ fn random_tools_on_random_ways_never_panic_and_leave_no_node_inside() {
     let mut n_touched = 0;
     let mut n_runs = 0;
     for_each_seed(300, |_, random| {
-        // Constrained parts take long to set up: one in three of them.
-        let mut which = random.below(ready.len());
-        if ready[which].prepared.bubbles.is_some() && random.chance(0.7) {
-            which = random.below(ready.len());
-        }
-        let touched = run(random, &ready[which], &meshes)
-            .map_err(|why| format!("{}: {why}", ready[which].name))?;
+        let ready = &ready[random.below(ready.len())];
+        let touched =
+            run(random, ready, &meshes).map_err(|why| format!("{}: {why}", ready.name))?;
         n_runs += 1;
         n_touched += u32::from(touched > 0);
         Ok(())

@@ -40,9 +40,8 @@ fn accuracy_keys(random: &mut Random) -> String {
         "columns = \"near\"",
         "contact_scalar = \"f32\"",
         "adaptive = 0.002",
-        "adaptive = { method = \"constrain\", radius = 0.003 }",
         "rates = { every = 3 }",
-        "lcp_rounds = 2",
+        "contact_iterations = 2",
     ];
     add(random.pick(&of).to_owned());
     if random.chance(0.3) {

@@ -21,13 +21,8 @@ impl Engine {
     /// Memory for frozen problems of this engine, empty: no contact, and nowhere valid.
     ///
     /// # Panics
-    /// For a constrained part, whose operator changes while free nodes are switched, and for a tool whose edges touch
-    /// (scenes that ask for both are refused).
+    /// For a tool whose edges touch (scenes that ask for it are refused).
     pub fn frozen_problem(&self) -> FrozenProblem {
-        assert!(
-            self.constrained.is_none(),
-            "the operator of a constrained part is not frozen"
-        );
         assert!(
             self.edges.is_none(),
             "rows between the nodes are not frozen"
@@ -132,7 +127,7 @@ impl Engine {
             is_row[plane.candidate as usize] = true;
         }
         let pose = report.tool_pose;
-        let state = state_of(part, &self.tool, &pose, &self.scratch, None);
+        let state = state_of(part, &self.tool, &pose, &self.scratch);
         self.watch.advance(state);
         self.watch.look(state);
         self.watch.within(part.clusters(), reach, candidates);
@@ -143,7 +138,6 @@ impl Engine {
         let deformed = Deformed {
             part,
             active: &self.scratch.active,
-            constrained: None,
             pairs: &self.scratch.pairs,
         };
         let position_of = |candidate: u32| {

@@ -190,18 +190,9 @@ pub(in crate::scene) enum AdaptiveRaw {
 #[derive(Debug, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(in crate::scene) struct AdaptiveKeys {
-    pub(in crate::scene) method: Option<MethodRaw>,
     pub(in crate::scene) radius: Option<At<f64>>,
     pub(in crate::scene) indicator: Option<At<f64>>,
     pub(in crate::scene) budget_us: Option<At<f64>>,
-}
-
-/// How constrained interface nodes follow.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub(in crate::scene) enum MethodRaw {
-    Select,
-    Constrain,
 }
 
 impl<'de> Deserialize<'de> for AdaptiveRaw {
@@ -248,7 +239,6 @@ impl JsonSchema for AdaptiveRaw {
                 {
                     "type": "object",
                     "properties": {
-                        "method": { "enum": ["select", "constrain"] },
                         "radius": { "type": "number", "minimum": 0 },
                         "indicator": { "type": "number", "exclusiveMinimum": 0 },
                         "budget_us": { "type": "number", "exclusiveMinimum": 0 }
@@ -321,13 +311,11 @@ pub(in crate::scene) struct AccuracyKeys {
     /// Order of the elements, 1, 2 or 3; raised or lowered from the mesh's own.
     #[schemars(range(min = 1, max = 3), extend("x-default" = "the mesh's own"))]
     pub(in crate::scene) order: Option<At<i64>>,
-    /// The p-method: which interface nodes (those on edges and faces) are free; the others follow
-    /// their principal nodes (the elements' vertices). `"off"`: all are free. A number: those within
-    /// this radius of the contact. A table: `radius`, or `indicator` (free where the edge bends by
-    /// more than this share of the largest displacement), or `budget_us` (as many as this time
-    /// allows, nearest first); and `method`: `"select"` (forces are those of the full order,
-    /// only the drawn shape is interpolated) or `"constrain"` (a stiffer part: Galerkin's method on
-    /// the free nodes, for comparison). Example: `{ method = "constrain", radius = 3.0 }`.
+    /// The p-method: which interface nodes (those on edges and faces) are drawn where they are; the others follow
+    /// their principal nodes (the elements' vertices). Forces are those of the full order whatever is chosen.
+    /// `"off"`: all. A number: those within this radius of the contact. A table: `radius`, or `indicator` (where the
+    /// edge bends by more than this share of the largest displacement), or `budget_us` (as many as this time
+    /// allows, nearest first). Example: `{ radius = 3.0 }`.
     #[schemars(extend("x-quantity" = "length", "default" = "off"))]
     pub(in crate::scene) adaptive: Option<At<AdaptiveRaw>>,
     /// How often contact planes are put on anew at the new positions within one step: until the
@@ -337,15 +325,6 @@ pub(in crate::scene) struct AccuracyKeys {
     /// Nodes nearer to the tool than this get a contact plane, above 0.
     #[schemars(extend("x-quantity" = "length", "x-default" = "chosen from the tool's motion"))]
     pub(in crate::scene) near_distance: Option<At<f64>>,
-    /// Largest residual of the contact solution, scaled by its largest terms, 1e-15 to 1e-2;
-    /// what is beyond it is reported.
-    #[schemars(extend("x-quantity" = "number", "default" = default::LCP_TOLERANCE))]
-    pub(in crate::scene) lcp_tolerance: Option<At<f64>>,
-    /// Rounds of principal pivoting in one contact problem, 1 to 1000, and then ten times as many
-    /// sweeps of Gauss-Seidel; the best answer is taken and what is not solved is reported. Without
-    /// this key there is no such budget: the exact answer is found.
-    #[schemars(range(min = 1, max = 1000), extend("x-default" = "no budget"))]
-    pub(in crate::scene) lcp_rounds: Option<At<i64>>,
     /// Rows of the contact problem of one step, 1 to 5000; its time grows with their cube. Where
     /// more nodes are near, neighbours share a row, up to eight times as many; beyond that the
     /// deepest are kept and the rest is counted and reported.
@@ -355,14 +334,13 @@ pub(in crate::scene) struct AccuracyKeys {
     /// each step's contact problem over, which the loop solves again in every period: `{ every = 5 }`,
     /// the results being there that many periods later, 1 to 50 and 50 ms at most (where the run waits
     /// for the real clock: as soon as they are solved). `"auto"`: one; where the run waits for the
-    /// clock, two if 99 % of the steps of a rehearsal do not fit 0.7 of the period. Not with
-    /// `method = "constrain"`.
+    /// clock, two if 99 % of the steps of a rehearsal do not fit 0.7 of the period.
     #[schemars(extend("default" = "auto"))]
     pub(in crate::scene) rates: Option<At<RatesRaw>>,
     /// Corners and sharp edges of the tool (a box, a cylinder of finite length, a mesh that bends by more than 20 degrees)
     /// against the part's faces between its nodes: each point of them at a face is one more contact plane, of
     /// `max_contacts` too. Without it contact acts at nodes only, and what comes between them is not seen. Edges
-    /// are sampled at half the part's smallest face. A step then takes some 0.1 ms on the shipped hook (docs/performance.md). Not with `adaptive`'s method `"constrain"`.
+    /// are sampled at half the part's smallest face. A step then takes some 0.1 ms on the shipped hook (docs/performance.md).
     #[schemars(extend("default" = "auto"))]
     pub(in crate::scene) tool_features: Option<At<ToolFeaturesRaw>>,
     /// Where nodes share rows, relative error of the resultant force above which steps are counted
@@ -384,7 +362,7 @@ pub(in crate::scene) struct AccuracyKeys {
     pub(in crate::scene) columns: Option<At<Columns>>,
     /// Where the displacement multiply runs; forces do not depend on it. `"auto"` measures processor and GPU once for each
     /// part, remembers the winner beside the prepared part, and says what it chose; a GPU that fails in a run is given up
-    /// for the processor. `"gpu"` is not for `scalar = "f64"`, `columns = "near"` or `adaptive`'s method `"constrain"`.
+    /// for the processor. `"gpu"` is not for `scalar = "f64"` or `columns = "near"`.
     #[schemars(extend("default" = "auto"))]
     pub(in crate::scene) multiply: Option<At<MultiplyRaw>>,
 }

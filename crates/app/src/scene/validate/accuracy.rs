@@ -2,13 +2,13 @@
 
 use super::super::error::line_of;
 use super::super::raw::{
-    AccuracyKeys, AdaptiveKeys, AdaptiveRaw, At, IterationsRaw, MethodRaw, MultiplyRaw,
-    MultiplyScalarRaw, PresetRaw, RatesRaw, ScalarRaw, ToolFeaturesRaw, default,
+    AccuracyKeys, AdaptiveKeys, AdaptiveRaw, At, IterationsRaw, MultiplyRaw, MultiplyScalarRaw,
+    PresetRaw, RatesRaw, ScalarRaw, ToolFeaturesRaw, default,
 };
 use super::super::units::Quantity;
 use super::super::{
-    Accuracy, Adaptive, Columns, ContactIterations, FreeNodes, Multiply, MultiplyScalar, PMethod,
-    Preset, Rates, Scalar, SceneError, ToolFeatures,
+    Accuracy, Adaptive, Columns, ContactIterations, FreeNodes, Multiply, MultiplyScalar, Preset,
+    Rates, Scalar, SceneError, ToolFeatures,
 };
 use super::{Check, Range};
 
@@ -41,7 +41,7 @@ impl Check<'_> {
                 None => None,
             },
             rates: match &raw.rates {
-                Some(at) => self.rates(at, adaptive, period)?,
+                Some(at) => self.rates(at, period)?,
                 None => base.rates,
             },
             adaptive,
@@ -50,14 +50,6 @@ impl Check<'_> {
                 None => base.contact_iterations,
             },
             near_distance,
-            lcp_tolerance: match &raw.lcp_tolerance {
-                Some(at) => self.lcp_tolerance(at)?,
-                None => base.lcp_tolerance,
-            },
-            lcp_rounds: match &raw.lcp_rounds {
-                Some(at) => Some(self.integer("lcp_rounds", at, 1, 1000)? as usize),
-                None => None,
-            },
             max_contacts: max_contacts as usize,
             merge_tolerance: match &raw.merge_tolerance {
                 Some(at) => self.merge_tolerance(at)?,
@@ -77,11 +69,11 @@ impl Check<'_> {
                 None => base.contact_scalar,
             },
             columns: self.columns(raw, base.adaptive)?,
-            multiply: self.multiply(raw, adaptive)?,
+            multiply: self.multiply(raw)?,
         })
     }
 
-    fn multiply(&self, raw: &AccuracyKeys, adaptive: Adaptive) -> Result<Multiply, SceneError> {
+    fn multiply(&self, raw: &AccuracyKeys) -> Result<Multiply, SceneError> {
         let at = match &raw.multiply {
             None => return Ok(Multiply::Auto),
             Some(at) => at,
@@ -91,13 +83,6 @@ impl Check<'_> {
             MultiplyRaw::Cpu => return Ok(Multiply::Cpu),
             MultiplyRaw::Gpu => {}
         }
-        let is_constrained = matches!(
-            adaptive,
-            Adaptive::On {
-                method: PMethod::Constrain,
-                ..
-            }
-        );
         let f64_at = raw
             .scalar
             .as_ref()
@@ -114,11 +99,6 @@ impl Check<'_> {
             let what = "columns \"near\" does not go with multiply \"gpu\", which needs the whole compliance";
             let mend = "leave one of the two out";
             return Err(self.error(columns.offset, what.to_owned(), mend));
-        }
-        if is_constrained {
-            let what = "multiply \"gpu\" does not go with adaptive method \"constrain\"".to_owned();
-            let mend = "leave one of the two out, or write method = \"select\"";
-            return Err(self.error(at.offset, what, mend));
         }
         Ok(Multiply::Gpu)
     }
@@ -169,8 +149,6 @@ impl Check<'_> {
             ("order", raw.order.is_some()),
             ("adaptive", raw.adaptive.is_some()),
             ("contact_iterations", raw.contact_iterations.is_some()),
-            ("lcp_tolerance", raw.lcp_tolerance.is_some()),
-            ("lcp_rounds", raw.lcp_rounds.is_some()),
             ("scalar", raw.scalar.is_some()),
         ];
         match beside.into_iter().find(|(_, is_there)| *is_there) {
@@ -183,12 +161,7 @@ impl Check<'_> {
         }
     }
 
-    fn rates(
-        &self,
-        at: &At<RatesRaw>,
-        adaptive: Adaptive,
-        period: f64,
-    ) -> Result<Rates, SceneError> {
+    fn rates(&self, at: &At<RatesRaw>, period: f64) -> Result<Rates, SceneError> {
         /// s, after which a result is too old: twice as old, before the next, it would begin to fade.
         const MOST_DELAY: f64 = 0.05;
         let every = match &at.value {
@@ -204,15 +177,6 @@ impl Check<'_> {
                 f64::from(periods) * period
             );
             return Err(self.error(every.offset, what, format!("write {most} or less")));
-        }
-        if let Adaptive::On {
-            method: PMethod::Constrain,
-            ..
-        } = adaptive
-        {
-            let what = "rates.every does not go with adaptive method \"constrain\"".to_owned();
-            let mend = "leave one of the two out, or write method = \"select\"";
-            return Err(self.error(at.offset, what, mend));
         }
         Ok(Rates::Every(periods))
     }
@@ -233,15 +197,6 @@ impl Check<'_> {
         }
     }
 
-    fn lcp_tolerance(&self, at: &At<f64>) -> Result<f64, SceneError> {
-        let value = self.number("lcp_tolerance", at, Quantity::Number, Range::Positive)?;
-        if !(1e-15..=1e-2).contains(&value) {
-            let what = format!("lcp_tolerance {value:e} is not between 1e-15 and 1e-2");
-            return Err(self.error(at.offset, what, "1e-10 is safe with 64-bit numbers"));
-        }
-        Ok(value)
-    }
-
     fn merge_tolerance(&self, at: &At<f64>) -> Result<f64, SceneError> {
         let value = self.number("merge_tolerance", at, Quantity::Number, Range::Positive)?;
         if value > 1.0 {
@@ -257,10 +212,7 @@ impl Check<'_> {
             AdaptiveRaw::Radius(value) => {
                 let (value, offset) = (*value, at.offset);
                 let radius = At { value, offset };
-                Ok(Adaptive::On {
-                    method: PMethod::Select,
-                    free: FreeNodes::Radius(self.radius(&radius)?),
-                })
+                Ok(Adaptive::On(FreeNodes::Radius(self.radius(&radius)?)))
             }
             AdaptiveRaw::Keys(keys) => self.adaptive_keys(keys, at.offset),
         }
@@ -286,31 +238,16 @@ impl Check<'_> {
                 return Err(self.error(offset, what, mend));
             }
         };
-        Ok(Adaptive::On {
-            method: match keys.method {
-                Some(MethodRaw::Constrain) => PMethod::Constrain,
-                Some(MethodRaw::Select) | None => PMethod::Select,
-            },
-            free,
-        })
+        Ok(Adaptive::On(free))
     }
 
     fn tool_features(&self, raw: &AccuracyKeys) -> Result<ToolFeatures, SceneError> {
         let Some(at) = &raw.tool_features else {
             return Ok(ToolFeatures::Auto);
         };
-        let constrain = match raw.adaptive.as_ref().map(|at| &at.value) {
-            Some(AdaptiveRaw::Keys(keys)) => matches!(keys.method, Some(MethodRaw::Constrain)),
-            _ => false,
-        };
         match at.value {
             ToolFeaturesRaw::Auto => Ok(ToolFeatures::Auto),
             ToolFeaturesRaw::Off => Ok(ToolFeatures::Off),
-            ToolFeaturesRaw::On if constrain => Err(self.error(
-                at.offset,
-                "tool_features \"on\" does not go with adaptive's method \"constrain\"".to_owned(),
-                "use method \"select\", which has the same forces as no adaptive, or tool_features \"off\"",
-            )),
             ToolFeaturesRaw::On => Ok(ToolFeatures::On {
                 line: line_of(self.source, at.offset),
             }),

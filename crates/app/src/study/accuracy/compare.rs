@@ -193,7 +193,6 @@ mod tests {
             contacts: 3,
             not_converged: 0,
             certificate: 1e-15,
-            switch_change: 0.0,
             penetration: 1e-6,
             wrench: path(scale),
             potential: vec![0.0, 1.0, scale * 4.0, 2.0, 1.0],

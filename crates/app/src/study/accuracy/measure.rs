@@ -266,8 +266,6 @@ pub struct Measured {
     pub not_converged: usize,
     /// Largest natural residual.
     pub certificate: f64,
-    /// N, largest change of the wrench by switching free nodes.
-    pub switch_change: f64,
     /// m, deepest that a node was inside the tool.
     pub penetration: f64,
     /// On the tool about the point at which it is held, by step: force (N) and torque (N m).
@@ -295,7 +293,6 @@ impl Measured {
             contacts: 0,
             not_converged: 0,
             certificate: 0.0,
-            switch_change: 0.0,
             penetration: 0.0,
             wrench: Vec::with_capacity(n_steps),
             potential: Vec::with_capacity(n_steps),
@@ -380,7 +377,6 @@ pub(super) fn measure(
         found.contacts = found.contacts.max(report.contacts);
         found.not_converged += usize::from(!report.converged);
         found.certificate = found.certificate.max(report.certificate);
-        found.switch_change = found.switch_change.max(report.switch_change);
         let u = shape.update(engine)?;
         if moments.contains(&k)
             && let Some(rows) = &rows
@@ -392,7 +388,7 @@ pub(super) fn measure(
                 }
             }
         }
-        let free = shape.n_free().unwrap_or(report.free_nodes as usize);
+        let free = shape.n_free().unwrap_or(0);
         found.free_nodes = found.free_nodes.max(free);
         if moments.contains(&k) {
             if interrupt::is_requested() {

@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::choice::SOFTWARE;
 use crate::report::plot::short;
 use crate::scene::{
-    Accuracy, Adaptive, ContactIterations, FreeNodes, Multiply, MultiplyScalar, PMethod, Preset,
+    Accuracy, Adaptive, ContactIterations, FreeNodes, Multiply, MultiplyScalar, Preset,
     QuadratureRule, Rates, Scalar, Scene,
 };
 
@@ -22,12 +22,6 @@ pub enum Axis {
     Planes,
     /// Which interface nodes are free, forces of the full order.
     Select,
-    /// Which interface nodes are free, by Galerkin.
-    Constrain,
-    /// Tolerance of the complementarity problem.
-    LcpTolerance,
-    /// Rounds of pivoting in a complementarity problem.
-    LcpRounds,
     /// Planes kept in a step.
     MaxContacts,
     /// Periods after which the results of whole steps are there.
@@ -44,15 +38,12 @@ pub enum Axis {
 
 impl Axis {
     /// All, in the order of the tables.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 11] = [
         Self::Order,
         Self::Interior,
         Self::Mesh,
         Self::Planes,
         Self::Select,
-        Self::Constrain,
-        Self::LcpTolerance,
-        Self::LcpRounds,
         Self::MaxContacts,
         Self::Rates,
         Self::Scalar,
@@ -69,9 +60,6 @@ impl Axis {
             Self::Mesh => "mesh",
             Self::Planes => "planes",
             Self::Select => "select",
-            Self::Constrain => "constrain",
-            Self::LcpTolerance => "lcp",
-            Self::LcpRounds => "lcp-budget",
             Self::MaxContacts => "contacts",
             Self::Rates => "rates",
             Self::Scalar => "scalar",
@@ -89,9 +77,6 @@ impl Axis {
             Self::Mesh => "mesh",
             Self::Planes => "passes over the contact planes",
             Self::Select => "p-method: select (free nodes drawn)",
-            Self::Constrain => "p-method: constrain (free nodes solved)",
-            Self::LcpTolerance => "LCP tolerance",
-            Self::LcpRounds => "LCP budget",
             Self::MaxContacts => "contacts kept",
             Self::Rates => "two rates (frozen problems in the loop)",
             Self::Scalar => "numbers of the drawn shape",
@@ -145,15 +130,8 @@ impl Setting {
     /// What its preparing depends on.
     pub(super) fn part_key(&self) -> String {
         let part = &self.scene.part;
-        let bubbles = match self.scene.accuracy.adaptive {
-            Adaptive::On {
-                method: PMethod::Constrain,
-                free,
-            } => format!("{free:?}"),
-            _ => String::new(),
-        };
         format!(
-            "{} refined {} order {:?} inside {:?} {:?} {bubbles}",
+            "{} refined {} order {:?} inside {:?} {:?}",
             part.mesh.display(),
             self.refinements,
             part.order,
@@ -265,14 +243,11 @@ pub(super) fn points(
                     s.scene.accuracy.contact_iterations = ContactIterations::Converged;
                 });
             }
-            Axis::Select | Axis::Constrain if own == 1 => {}
+            Axis::Select if own == 1 => {}
             Axis::Select => {
                 let mut free = |label: String, free| {
                     add(label, &|s| {
-                        s.scene.accuracy.adaptive = Adaptive::On {
-                            method: PMethod::Select,
-                            free,
-                        };
+                        s.scene.accuracy.adaptive = Adaptive::On(free);
                     });
                 };
                 free("none free".to_owned(), FreeNodes::Radius(0.0));
@@ -285,41 +260,6 @@ pub(super) fn points(
                     s.scene.accuracy.adaptive = Adaptive::Off;
                 });
             }
-            Axis::Constrain => {
-                for share in [0.0, 0.025, 0.05, 0.1, 0.2] {
-                    let radius = rounded(share * extent);
-                    let label = if share == 0.0 {
-                        "none free".to_owned()
-                    } else {
-                        within(radius)
-                    };
-                    add(label, &|s| {
-                        s.scene.accuracy.adaptive = Adaptive::On {
-                            method: PMethod::Constrain,
-                            free: FreeNodes::Radius(radius),
-                        };
-                        s.scene.accuracy.multiply = Multiply::Cpu;
-                        s.scene.part.interior_order = None;
-                    });
-                }
-                add("all free".to_owned(), &|s| {
-                    s.scene.accuracy.adaptive = Adaptive::Off;
-                });
-            }
-            Axis::LcpTolerance => {
-                for tolerance in [1e-3, 1e-6, 1e-10, 1e-13] {
-                    add(format!("{tolerance:e}"), &|s| {
-                        s.scene.accuracy.lcp_tolerance = tolerance;
-                    });
-                }
-            }
-            Axis::LcpRounds => {
-                for rounds in [1, 2, 4] {
-                    let label = format!("{rounds} rounds").replace("1 rounds", "1 round");
-                    add(label, &|s| s.scene.accuracy.lcp_rounds = Some(rounds));
-                }
-                add("none".to_owned(), &|s| s.scene.accuracy.lcp_rounds = None);
-            }
             Axis::MaxContacts => {
                 for most in [8, 16, 32, 500] {
                     add(format!("{most} planes"), &|s| {
@@ -331,15 +271,7 @@ pub(super) fn points(
                 add("one rate".to_owned(), &|s| {
                     s.scene.accuracy.rates = Rates::One;
                 });
-                // A constrained part has one rate only.
-                let is_constrained = matches!(
-                    scene.accuracy.adaptive,
-                    Adaptive::On {
-                        method: PMethod::Constrain,
-                        ..
-                    }
-                );
-                for every in [2, 5, 10, 20].into_iter().filter(|_| !is_constrained) {
+                for every in [2, 5, 10, 20] {
                     add(format!("results {every} periods later"), &|s| {
                         s.scene.accuracy.rates = Rates::Every(every);
                     });

@@ -239,6 +239,5 @@ pub(super) fn read_reference(
 pub(super) fn own_order(scene: &Scene) -> Result<u8, Error> {
     let mut spec = setup::part_spec(scene)?;
     spec.order = None;
-    spec.bubbles = None;
     Ok(load(&spec)?.mesh.order as u8)
 }

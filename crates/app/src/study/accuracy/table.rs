@@ -247,7 +247,7 @@ pub(super) fn csv(study: &Study) -> String {
     }
     out.push_str(
         ",prepare_s,bytes,wrench_l2_rel,solver_l2_rel,wrench_max_rel,peak_rel,peak_travel_m,displacement_rel,\
-         energy_rel,penetration_m,certificate,switch_change_N,steps_not_converged,front,repeat_over_shortest,disturbed_share\n",
+         energy_rel,penetration_m,certificate,steps_not_converged,front,repeat_over_shortest,disturbed_share\n",
     );
     let all = study.distinct();
     let costs: Vec<(f64, f64)> = all.iter().map(|(_, m, e)| (p999(m), e.wrench_l2)).collect();
@@ -286,7 +286,7 @@ pub(super) fn csv(study: &Study) -> String {
                 let is_front = front.iter().any(|r| std::ptr::eq(*r, row));
                 let _ = writeln!(
                     out,
-                    ",{},{},{},{},{},{},{},{},{},{},{},{},{},{is_front},{},{}",
+                    ",{},{},{},{},{},{},{},{},{},{},{},{},{is_front},{},{}",
                     m.prepare_s,
                     m.bytes,
                     e.wrench_l2,
@@ -298,7 +298,6 @@ pub(super) fn csv(study: &Study) -> String {
                     e.energy,
                     m.penetration,
                     m.certificate,
-                    m.switch_change,
                     m.not_converged,
                     optional(m.repeats.map(|r| r.typical)),
                     optional(m.repeats.map(|r| r.disturbed)),

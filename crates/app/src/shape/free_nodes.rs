@@ -1,21 +1,21 @@
 //! Which interface nodes are free: near the contact, where the part bends, or as many as time allows.
 //!
 //! Source: Duriez et al. 2004, section 3.2: the free interface nodes are chosen at each time step in
-//! O(n_i). Here a step looks at a share of the nodes and each has its turn, so that the cost of a step
+//! O(n_i). Here an update looks at a share of the nodes and each has its turn, so that the cost of an update
 //! is a share of that. A node is freed at one limit and constrained again at a looser one, so that it
 //! does not chatter.
 
 use glam::DVec3;
 
 /// A free node is constrained beyond this multiple of the radius at which it was freed...
-pub(crate) const LOOSE_RADIUS: f64 = 1.25;
+const LOOSE_RADIUS: f64 = 1.25;
 
 /// ... or below this share of the bend.
 const LOOSE_BEND: f64 = 0.5;
 
 /// By what a node is judged.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Rule {
+pub(super) enum Rule {
     /// Distance from the nearest contact at rest, m.
     Radius(f64),
     /// Bend of its edge or face over the largest displacement.
@@ -26,7 +26,7 @@ pub(crate) enum Rule {
 
 /// State of every interface node, free or constrained.
 #[derive(Clone, Debug)]
-pub(crate) struct FreeNodes {
+pub(super) struct FreeNodes {
     rule: Rule,
     max_free: usize,
     positions: Vec<DVec3>,
@@ -37,7 +37,6 @@ pub(crate) struct FreeNodes {
     slice: usize,
     /// m; the rule's, or for [`Rule::Nearest`] the one that frees about `max_free` nodes.
     radius: f64,
-    start_radius: f64,
     /// Nodes within `radius` met in this sweep, to steer it.
     n_within: usize,
 }
@@ -45,7 +44,7 @@ pub(crate) struct FreeNodes {
 impl FreeNodes {
     /// `positions`: the interface nodes at rest, m. `turns`: calls in which every node is looked at
     /// once. None is free yet.
-    pub(crate) fn new(rule: Rule, max_free: usize, positions: Vec<DVec3>, turns: usize) -> Self {
+    pub(super) fn new(rule: Rule, max_free: usize, positions: Vec<DVec3>, turns: usize) -> Self {
         let (low, high) = positions
             .iter()
             .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(a, b), x| {
@@ -66,45 +65,35 @@ impl FreeNodes {
             n_free: 0,
             cursor: 0,
             radius,
-            start_radius: radius,
             n_within: 0,
         }
     }
 
     /// Whether each node is free.
-    pub(crate) fn is_free(&self) -> &[bool] {
+    pub(super) fn is_free(&self) -> &[bool] {
         &self.is_free
     }
 
     /// Number of free nodes.
-    pub(crate) fn n_free(&self) -> usize {
+    pub(super) fn n_free(&self) -> usize {
         self.n_free
     }
 
     /// Whether the rule asks for the bend of a node.
-    pub(crate) fn looks_at_bend(&self) -> bool {
+    pub(super) fn looks_at_bend(&self) -> bool {
         matches!(self.rule, Rule::Indicator(_))
     }
 
     /// Nodes that the next [`Self::sweep`] will look at.
-    pub(crate) fn next_slice(&self) -> std::ops::Range<usize> {
+    pub(super) fn next_slice(&self) -> std::ops::Range<usize> {
         self.cursor..(self.cursor + self.slice).min(self.positions.len())
-    }
-
-    /// Constrains all.
-    pub(crate) fn reset(&mut self) {
-        self.is_free.fill(false);
-        self.n_free = 0;
-        self.cursor = 0;
-        self.radius = self.start_radius;
-        self.n_within = 0;
     }
 
     /// Looks at the next share of the nodes. `contacts`: rest positions of the nodes in contact, m;
     /// without any, nothing changes. `bend(i)`: how far node `i` would be from where it is, were it
     /// constrained, m, asked for only if the rule needs it; `largest`: the largest displacement, m.
     /// Returns whether a node changed. Does not allocate.
-    pub(crate) fn sweep(
+    pub(super) fn sweep(
         &mut self,
         contacts: &[DVec3],
         bend: impl Fn(usize) -> f64,
@@ -204,8 +193,6 @@ mod tests {
         assert_eq!(free(&nodes), (40..=62).collect::<Vec<_>>());
         sweeps(&mut nodes, 2, 56.0);
         assert_eq!(free(&nodes), (43..=66).collect::<Vec<_>>());
-        nodes.reset();
-        assert_eq!(free(&nodes), [0usize; 0]);
     }
 
     #[test]

@@ -20,7 +20,7 @@ use device::{VirtualCoupling, Wrench};
 use glam::DVec3;
 use glamx::DPose3;
 use half_space::{CELL, half_space};
-use snapin::engine::{ContactIterations, ContactPart, Engine, EngineSettings, StepReport};
+use snapin::engine::{ContactIterations, ContactPart, Engine, EngineSettings, Plan, StepReport};
 use snapin::machine::Machine;
 use snapin::session::fast::FastSettings;
 use snapin::session::slow::Stepped;
@@ -49,7 +49,7 @@ fn engine(part: &Arc<ContactPart>) -> Engine {
     };
     let tool = Tool::Sphere(Sphere::new(RADIUS).unwrap());
     let coupling = VirtualCoupling::new(2e4, 1e3).unwrap();
-    Engine::new(Arc::clone(part), tool, Some(coupling), settings).unwrap()
+    Engine::new(Plan::new(Arc::clone(part), tool, Some(coupling), settings)).unwrap()
 }
 
 /// Presses by the depth of so many contacts if the coupling did not yield, and slides.

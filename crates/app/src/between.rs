@@ -89,12 +89,12 @@ impl Between {
         }
     }
 
-    /// Words for a warning, if the tool is too fine for the mesh. `travel` (m): of the whole run. `has_edges`: whether
-    /// sharp edges are felt in faces; then only what is smooth can be missed, which the depth shows. `has_facets`: whether
+    /// Words for a warning, if the tool is too fine for the mesh. `travel` (m): of the whole run. `is_felt_between`: whether
+    /// it is felt between the nodes; then only what is smooth can be missed, which the depth shows. `has_facets`: whether
     /// the tool is a mesh, of which a round is as many slopes.
-    pub fn warning(&self, travel: f64, has_edges: bool, has_facets: bool) -> Option<String> {
+    pub fn warning(&self, travel: f64, is_felt_between: bool, has_facets: bool) -> Option<String> {
         let is_deep = |p: &Place| p.depth > TOLD_DEPTH * travel && p.depth > AT_FACE * p.spacing;
-        let is_fine = |p: &Place| !has_edges && p.radius < NODES_IN_RADIUS * p.spacing;
+        let is_fine = |p: &Place| !is_felt_between && p.radius < NODES_IN_RADIUS * p.spacing;
         let is_facet = |p: &Place| has_facets && p.radius < FACET * p.spacing;
         let deep = self.deepest.filter(is_deep);
         let place = deep.or(self.finest.filter(is_fine))?;
@@ -272,8 +272,8 @@ impl<'a> BetweenNodes<'a> {
     /// `travel`: of the whole run, m.
     pub(crate) fn warning(&self, travel: f64) -> Option<String> {
         let has_facets = matches!(self.engine.tool(), Tool::Mesh(_) | Tool::Field(_));
-        self.between
-            .warning(travel, self.engine.has_edges(), has_facets)
+        let is_felt_between = self.engine.has_features() || self.engine.has_moving_places();
+        self.between.warning(travel, is_felt_between, has_facets)
     }
 }
 

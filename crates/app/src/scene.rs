@@ -1,7 +1,8 @@
 //! The scene: what a TOML file says about a part, a tool and a hand, checked and in SI units.
 //!
 //! The data's way: text → keys as written (every one with its place in the file) →
-//! [`Scene`], in which nothing has to be checked again. What is wrong is a [`SceneError`] with
+//! [`Scene`], in which nothing has to be checked again. Each section is one file, with its keys as
+//! written and as they mean. What is wrong is a [`SceneError`] with
 //! file, line, key and mend. The keys are listed in `docs/scene.md`, which [`schema`] writes.
 //!
 //! ```no_run
@@ -11,29 +12,52 @@
 //! ```
 
 mod accuracy;
+mod check;
+mod coupling;
+mod device;
+mod drive;
+mod effects;
 mod error;
+mod hand;
 pub mod handbook;
-mod raw;
+mod holds;
+mod keys;
+mod limits;
+mod output;
+mod part;
+mod reader;
 pub mod schema;
 #[cfg(test)]
 mod tests;
+mod tool;
 mod units;
-mod validate;
 
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
-use glamx::DPose3;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
 pub use accuracy::{
-    Accuracy, Adaptive, Columns, ContactIterations, FreeNodes, Multiply, MultiplyScalar, Preset,
-    Rates, Scalar, ToolFeatures,
+    Accuracy, Adaptive, Columns, ContactAt, ContactIterations, FreeNodes, Multiply, MultiplyScalar,
+    Preset, Rates, Scalar, ToolFeatures,
 };
+use check::Check;
+pub use coupling::Coupling;
+pub use device::{Device, DeviceModel};
+pub use drive::{Drive, Guide};
+pub use effects::{EffectChoice, Effects};
 pub use error::SceneError;
+pub use hand::Hand;
 pub use handbook::Handbook;
+pub use holds::Handle;
+use keys::At;
+pub use limits::{Limits, StrainUse};
+pub use output::Output;
+pub use part::{Fixed, GroupName, Material, Part, QuadratureRule};
+pub use tool::{FieldOf, Start, Tool, ToolShape};
 use units::Quantity;
+pub use units::Units;
 
 /// A validated scene. Lengths in m, forces in N, times in s, whatever the file's units.
 ///
@@ -144,8 +168,9 @@ impl Scene {
     /// As [`Scene::load`].
     pub fn from_bytes(bytes: Vec<u8>, path: &Path) -> Result<Self, SceneError> {
         let source = error::text_of(bytes, path)?;
-        let raw = raw::parse(&source, path)?;
-        validate::scene(raw, source, path)
+        let keys: SceneKeys =
+            toml::from_str(&source).map_err(|error| reader::translate(&error, &source, path))?;
+        keys.checked(source, path)
     }
 
     /// The error for a group that the mesh does not have, naming the nearest of `known`.
@@ -164,327 +189,105 @@ impl Scene {
     }
 }
 
-/// Units of the scene file and of its mesh.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-pub enum Units {
-    /// m, N, s, Pa, kg.
-    #[default]
-    #[serde(rename = "SI")]
-    Si,
-    /// mm, N, s, MPa, t (tonne).
-    #[serde(rename = "mm-N-MPa")]
-    MmNMpa,
+/// A part, a tool that is pushed onto it, and the hand that pushes.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "snapin scene")]
+struct SceneKeys {
+    /// Title for reports and windows.
+    #[schemars(extend("x-default" = "the file's name"))]
+    title: Option<String>,
+    /// Units of every number in the scene and of the mesh's coordinates.
+    #[serde(default)]
+    units: Units,
+    /// The deformable part.
+    part: part::PartKeys,
+    /// The rigid tool that meets the part. It has its own frame, which `position` and `axis` or
+    /// `rotation` place in the part's frame (the mesh's).
+    tool: At<tool::ToolKeys>,
+    /// Which of the two bodies is held and moved, and where; the other one is fixed in the world.
+    #[serde(default)]
+    holds: holds::HoldsKeys,
+    /// The way of the held body in the part's own curve: driven rigidly, in steps of travel, as by a
+    /// testing machine. The verdict comes from this curve. A scene with `[hand]` alone lends its
+    /// `direction` and `travel`; a scene without either is refused.
+    drive: Option<At<drive::DriveKeys>>,
+    /// What the part's own curve has to keep; a run that does not, or of which that is not known, ends with exit code 1. Of a half or quarter model, forces are those of what is meshed.
+    limits: Option<limits::LimitsKeys>,
+    /// A scripted hand that feels the part besides: its target goes along `direction` at `speed`,
+    /// rests, and comes back if told; the handle follows it as a mass on a spring and a damper.
+    /// The defaults are an assumption: the orders of magnitude of a firm grip, not measured ones.
+    /// Without the section nothing is felt, and there is the part's own curve only.
+    hand: Option<At<hand::HandKeys>>,
+    /// The spring between the handle and the body that it holds. Soft hides stiff clips; the
+    /// measured curve is that of clip and coupling in series.
+    #[serde(default)]
+    coupling: coupling::CouplingKeys,
+    /// The haptic device.
+    #[serde(default)]
+    device: device::DeviceKeys,
+    /// What accuracy costs time, and how much of it is asked for: these keys, or one word for all
+    /// of them, `accuracy = "fast"`, `"balanced"` or `"exact"`, or `accuracy = { budget_us = 200 }`.
+    /// `snapin accuracy` shows what each choice costs in this scene.
+    #[serde(default)]
+    accuracy: accuracy::WordOrKeys,
+    /// Effects beyond the small-strain, frictionless, quasi-static model. `"off"`: left out on purpose; it is told if it would matter, and the verdict stands without it.
+    /// `"auto"`: its size is estimated and told. `"on"`: simulated, which this version cannot.
+    #[serde(default)]
+    effects: effects::EffectsKeys,
+    /// Which results are written.
+    #[serde(default)]
+    output: output::OutputKeys,
+    /// Dimensions of a joint for which there is a formula, for a comparison with the snap-fit
+    /// handbooks: force, removal and strain by hand stand beside the computed ones. Leave the
+    /// section out for any other part.
+    handbook: Option<At<handbook::HandbookKeys>>,
 }
 
-/// The deformable part.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Part {
-    /// Gmsh mesh; exists.
-    pub mesh: PathBuf,
-    /// Line of `mesh` in the scene file, for messages.
-    pub mesh_line: usize,
-    /// Other meshes of the same part, for the accuracy study; whether they exist is seen there.
-    pub other_meshes: Vec<PathBuf>,
-    /// Element order that is asked for, 1, 2 or 3; `None`: the mesh's own.
-    pub order: Option<u8>,
-    /// Order of the elements inside, 1 to 5; `None`: that of the surface.
-    pub interior_order: Option<u8>,
-    /// Linear elasticity and limits.
-    pub material: Material,
-    /// Held groups; never empty.
-    pub fixed: Vec<Fixed>,
-    /// Groups whose nodes can touch the tool; never empty.
-    pub contact: Vec<GroupName>,
-    /// Rule for the element integrals.
-    pub quadrature: QuadratureRule,
-}
-
-/// A mesh group by name, with the line that names it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct GroupName {
-    /// Name of the physical group.
-    pub name: String,
-    /// Line in the scene file.
-    pub line: usize,
-}
-
-/// A held group.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Fixed {
-    /// The group.
-    pub group: GroupName,
-    /// Which of x, y, z are held; at least one.
-    pub components: [bool; 3],
-}
-
-/// Material of the part.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Material {
-    /// For reports.
-    pub name: Option<String>,
-    /// Pa, > 0.
-    pub young_modulus: f64,
-    /// In (-1, 0.5).
-    pub poisson_ratio: f64,
-    /// kg/m³, > 0.
-    pub density: Option<f64>,
-    /// Largest strain that the material bears once, > 0 (0.02 is 2 %).
-    pub permissible_strain: Option<f64>,
-}
-
-/// Rule for the element integrals.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum QuadratureRule {
-    /// exact for straight elements only (4 points for quadratic ones).
-    Fast,
-    /// more points, so that curved elements are integrated to rounding too.
-    #[default]
-    Converged,
-}
-
-/// The rigid tool.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Tool {
-    /// In the tool's own frame.
-    pub shape: ToolShape,
-    /// Where the tool starts: its frame in the part's.
-    pub pose_part_tool: DPose3,
-    /// Whether it may start in the part.
-    pub start: Start,
-}
-
-/// How the tool stands to the part before the first step.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Start {
-    /// clear of the part or in touch with it; a tool inside the part is refused with the depth.
-    #[default]
-    Clear,
-    /// it may be inside the part, as after a press fit: the first step pushes the part out of it.
-    Overlap,
-}
-
-/// Shape of the tool in its own frame. Lengths in m, all > 0.
-#[derive(Clone, Debug, PartialEq)]
-pub enum ToolShape {
-    /// About the origin.
-    Sphere {
-        /// Radius.
-        radius: f64,
-    },
-    /// About local z.
-    Cylinder {
-        /// Radius.
-        radius: f64,
-        /// Half of its length along z; `None`: infinite.
-        half_length: Option<f64>,
-    },
-    /// About the origin.
-    Box {
-        /// Half of each edge along x, y, z.
-        half_extents: DVec3,
-    },
-    /// About local z.
-    Capsule {
-        /// Radius of the tube and of its two ends.
-        radius: f64,
-        /// Half of the distance between the centres of the two ends.
-        half_length: f64,
-    },
-    /// All with local z < 0; its outward normal is +z.
-    HalfSpace,
-    /// Closed surface from an STL or OBJ file; exists.
-    Mesh {
-        /// The file.
-        file: PathBuf,
-        /// Line of `file` in the scene file, for messages.
-        line: usize,
-        /// Factor from the file's coordinates to m.
-        scale: f64,
-        /// Distance field to be computed at load.
-        field: Option<FieldOf>,
-    },
-}
-
-/// A distance field that a scene asks for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FieldOf {
-    /// Bound on the error of its distances, m.
-    pub error: f64,
-    /// Line in the scene file, for messages.
-    pub line: usize,
-}
-
-/// What is held and moved.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Handle {
-    /// the tool moves, the part is fixed in the world.
-    #[default]
-    Tool,
-    /// the part moves, the tool is fixed in the world.
-    Part,
-}
-
-/// The way that the held body is driven, rigidly, as by a testing machine.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Drive {
-    /// Unit vector in the world: where the held body goes.
-    pub direction: DVec3,
-    /// m, > 0.
-    pub travel: f64,
-    /// m between two places, > 0, at most `travel`; finer where the force bends.
-    pub step: f64,
-    /// What the body does across the direction.
-    pub guide: Guide,
-    /// Whether it is pulled out again.
-    pub retract: bool,
-}
-
-/// What the driven body does across its direction.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Guide {
-    /// it goes along `direction` only and does not turn; models with planes of symmetry need this.
-    #[default]
-    Axis,
-    /// it gives way across `direction` and turns, against the springs of `[coupling]`.
-    Free,
-}
-
-/// What the part's own curve has to keep; each limit that is not kept fails the run.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Limits {
-    /// N, the peak of the way in stays below, > 0.
-    pub insertion_below: Option<f64>,
-    /// N, the largest pull of the way out goes above, > 0.
-    pub removal_above: Option<f64>,
-    /// The largest principal strain stays below, > 0 (0.02 is 2 %).
-    pub strain_below: Option<f64>,
-    /// How often the joint is used.
-    pub strain_use: StrainUse,
-}
-
-/// How often a joint is opened and closed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum StrainUse {
-    /// once: `strain_below` as it is.
-    #[default]
-    Once,
-    /// often: 60 % of `strain_below`.
-    Repeatedly,
-}
-
-/// The scripted hand: a mass on a spring and a damper, whose other end follows the script.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Hand {
-    /// Unit vector in the world: where the held body goes.
-    pub direction: DVec3,
-    /// m/s, > 0.
-    pub speed: f64,
-    /// m, > 0.
-    pub travel: f64,
-    /// Rest at full travel, s, >= 0.
-    pub hold: f64,
-    /// Whether the hand pulls back to the start afterwards.
-    pub retract: bool,
-    /// kg, > 0.
-    pub mass: f64,
-    /// N/m, > 0.
-    pub stiffness: f64,
-    /// N s/m, >= 0.
-    pub damping: f64,
-    /// kg m², > 0.
-    pub rotational_inertia: f64,
-    /// N m/rad, > 0.
-    pub rotational_stiffness: f64,
-    /// N m s/rad, >= 0.
-    pub rotational_damping: f64,
-}
-
-impl Hand {
-    /// Time of the whole script, s.
-    pub fn duration(&self) -> f64 {
-        let way = self.travel / self.speed;
-        way + self.hold + if self.retract { way } else { 0.0 }
+impl SceneKeys {
+    /// Checks everything and converts it to SI.
+    fn checked(self, source: String, path: &Path) -> Result<Scene, SceneError> {
+        let check = &Check {
+            source: &source,
+            path,
+            units: self.units,
+        };
+        let accuracy = self.accuracy.0;
+        let tool = &self.tool.value;
+        let device = self.device.checked(check)?;
+        let (drive, hand) = drive::motion(self.drive.as_ref(), self.hand.as_ref(), &device, check)?;
+        let order = accuracy.order(self.part.order, check)?;
+        let part = self.part.checked(order, check)?;
+        let handbook = self
+            .handbook
+            .map(|handbook| handbook.checked(tool, &part.material, check));
+        let scene = Scene {
+            path: path.to_path_buf(),
+            source: String::new(),
+            title: self.title.unwrap_or_else(|| {
+                path.file_stem()
+                    .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned())
+            }),
+            units: self.units,
+            length_scale: units::to_si(self.units, Quantity::Length),
+            part,
+            handbook: handbook.transpose()?,
+            tool: tool.checked(self.tool.offset, check)?,
+            handle: self.holds.handle,
+            grip: self.holds.grip(check)?,
+            drive,
+            hand,
+            limits: match self.limits {
+                Some(limits) => limits.checked(check)?,
+                None => Limits::default(),
+            },
+            coupling: self.coupling.checked(check)?,
+            accuracy: accuracy.checked(device.servo_period, check)?,
+            device,
+            effects: self.effects.checked(check)?,
+            output: self.output.checked(check)?,
+        };
+        // The checks borrowed the text for its lines until here.
+        Ok(Scene { source, ..scene })
     }
-}
-
-/// Virtual coupling between handle and held body.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Coupling {
-    /// N/m, > 0.
-    pub translational_stiffness: f64,
-    /// N m/rad, > 0.
-    pub rotational_stiffness: f64,
-}
-
-/// The haptic device.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Device {
-    /// Which one.
-    pub model: DeviceModel,
-    /// s, in [1e-5, 0.1].
-    pub servo_period: f64,
-    /// Whether steps wait for the clock; else they follow each other.
-    pub real_time: bool,
-}
-
-/// Known devices.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-pub enum DeviceModel {
-    /// simulated, with the force and torque limits of a Virtuose 6D.
-    #[default]
-    #[serde(rename = "virtuose-6d")]
-    Virtuose6d,
-}
-
-/// How each effect is to be treated.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Effects {
-    /// Coulomb friction between part and tool.
-    pub friction: EffectChoice,
-    /// Rotation of the part's arms beyond linear elasticity.
-    pub large_rotation: EffectChoice,
-    /// Weight of the part.
-    pub gravity: EffectChoice,
-    /// Mass of the tool.
-    pub tool_inertia: EffectChoice,
-    /// Mass of the part.
-    pub part_inertia: EffectChoice,
-    /// Damping of the part.
-    pub damping: EffectChoice,
-    /// Tool motion within one step.
-    pub continuous_collision: EffectChoice,
-    /// Elasticity of the tool.
-    pub deformable_tool: EffectChoice,
-    /// Coulomb's coefficient for the estimates, >= 0.
-    pub friction_coefficient: Option<f64>,
-}
-
-/// Whether an effect is estimated.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum EffectChoice {
-    /// Not looked at.
-    Off,
-    /// Its size is told.
-    #[default]
-    Auto,
-}
-
-/// Which results are written.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Output {
-    /// Number of moments of which pictures and shapes are kept.
-    pub frames: u32,
-    /// Unit vector from the part to the eye; `None` to choose it by the contact.
-    pub camera: Option<DVec3>,
-    /// PNG of each frame.
-    pub pictures: bool,
-    /// VTU (ParaView) of each frame.
-    pub vtu: bool,
-    /// Session as MCAP.
-    pub mcap: bool,
 }

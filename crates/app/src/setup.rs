@@ -15,11 +15,11 @@ use fem::{Material, Quadrature};
 
 use crate::Error;
 use crate::drive::DriveSpec;
-use crate::engine::{ContactIterations, Engine, EngineSettings};
+use crate::engine::{ContactIterations, ContactPlaces, Engine, EngineSettings, Plan};
 use crate::machine::Machine;
 use crate::prepare::budget::bytes;
 use crate::prepare::{ColumnChoice, GroupRef, PartSpec, PreparedPart};
-use crate::scene::{self, Adaptive, QuadratureRule, Scene, ToolFeatures, ToolShape};
+use crate::scene::{self, Adaptive, ContactAt, QuadratureRule, Scene, ToolFeatures, ToolShape};
 use crate::session::rates::Rates;
 use crate::session::{Clearance, Held, Holds, SessionSpec, part_extent};
 
@@ -204,15 +204,9 @@ fn with_field(
 /// # Errors
 /// Settings that the crates refuse; a distance of near nodes beyond the part's size.
 pub fn engine(scene: &Scene, prepared: &PreparedPart, tool: Tool) -> Result<Engine, Error> {
-    let grip = held(scene, prepared, &tool).engine_grip();
-    let engine = engine_with(
-        scene,
-        prepared,
-        tool,
-        Some(coupling(scene)?),
-        scene.accuracy.max_contacts,
-    )?;
-    Ok(engine.held_at(grip))
+    let coupling = Some(coupling(scene)?);
+    let plan = plan(scene, prepared, tool, coupling, scene.accuracy.max_contacts)?;
+    built(scene, plan)
 }
 
 /// The engine of the part's own curve: the tool's pose is imposed, or guided along the direction. `max_contacts`: rows of
@@ -231,9 +225,9 @@ pub fn drive_engine(
         scene::Guide::Axis => None,
         scene::Guide::Free => Some(coupling(scene)?),
     };
-    let engine = engine_with(scene, prepared, tool, coupling, max_contacts)?;
-    let way = held.way_of_tool(scene.drive.direction);
-    Ok(engine.held_at(held.engine_grip()).guided_along(way))
+    let plan = plan(scene, prepared, tool, coupling, max_contacts)?;
+    let guide = Some(held.way_of_tool(scene.drive.direction));
+    built(scene, Plan { guide, ..plan })
 }
 
 fn coupling(scene: &Scene) -> Result<VirtualCoupling, Error> {
@@ -243,13 +237,21 @@ fn coupling(scene: &Scene) -> Result<VirtualCoupling, Error> {
     )?)
 }
 
-fn engine_with(
+fn built(scene: &Scene, plan: Plan) -> Result<Engine, Error> {
+    Engine::new(plan).map_err(|source| Error::Tool {
+        path: scene.path.clone(),
+        source,
+    })
+}
+
+/// What a scene calls for.
+fn plan(
     scene: &Scene,
     prepared: &PreparedPart,
     tool: Tool,
     coupling: Option<VirtualCoupling>,
     max_contacts: usize,
-) -> Result<Engine, Error> {
+) -> Result<Plan, Error> {
     let extent = part_extent(&prepared.loaded.mesh);
     if let Some(near) = scene.accuracy.near_distance.filter(|near| *near > extent) {
         return Err(Error::Input(format!(
@@ -271,35 +273,56 @@ fn engine_with(
         lcp: lcp::Settings::default(),
         max_stride: STRIDE_SHARE * size,
     };
-    let in_scene = |source| Error::Tool {
-        path: scene.path.clone(),
-        source,
+    let grip = held(scene, prepared, &tool).engine_grip();
+    let plan = Plan {
+        grip,
+        ..Plan::new(prepared.contact_part(), tool, coupling, settings)
     };
-    let edges = tool_edges(scene, prepared, &tool)?;
-    let engine =
-        Engine::new(prepared.contact_part(), tool, coupling, settings).map_err(in_scene)?;
-    if let (Some(_), scene::Rates::Every(_)) = (&edges, scene.accuracy.rates) {
-        return Err(Error::Input(format!(
-            "{}: accuracy.rates.every does not go with a tool whose corners and edges touch; write tool_features = \
-             \"off\", or leave rates out",
-            scene.path.display()
-        )));
-    }
-    Ok(match edges {
-        Some((surface, features)) => engine.with_edges(surface, features),
-        None => engine,
-    })
+    with_contact(scene, prepared, plan)
 }
 
-/// The part's faces and the tool's corners and edges, where the scene wants them to touch and there are both.
+/// The plan with contact where the scene wants it: at places that move, and at the tool's corners and edges.
 ///
 /// # Errors
 /// A scene that insists on what is not there.
-pub fn tool_edges(
+pub fn with_contact(scene: &Scene, prepared: &PreparedPart, plan: Plan) -> Result<Plan, Error> {
+    let surface = contact_surface(scene, prepared)?;
+    Ok(Plan {
+        places: contact_places(scene, surface.as_ref())?,
+        features: tool_features(scene, surface.as_ref(), &plan.tool)?,
+        ..plan
+    })
+}
+
+/// The part's faces that can touch; `None` where its contact groups are loose nodes.
+fn contact_surface(scene: &Scene, prepared: &PreparedPart) -> Result<Option<Arc<Surface>>, Error> {
+    let surface = prepared.contact_surface();
+    let surface = surface.map_err(|source| Error::Tool {
+        path: scene.path.clone(),
+        source,
+    })?;
+    Ok(surface.map(Arc::new))
+}
+
+/// Where contact acts on the part.
+fn contact_places(scene: &Scene, surface: Option<&Arc<Surface>>) -> Result<ContactPlaces, Error> {
+    match (scene.accuracy.contact_at, surface) {
+        (ContactAt::Nodes, _) => Ok(ContactPlaces::Nodes),
+        (ContactAt::Places, Some(surface)) => Ok(ContactPlaces::Moving(Arc::clone(surface))),
+        (ContactAt::Places, None) => Err(Error::Input(format!(
+            "{}: accuracy.contact_at is \"places\", but the contact groups of the mesh have no faces; name a group of \
+             faces in part.contact, or write \"nodes\"",
+            scene.path.display()
+        ))),
+    }
+}
+
+/// The part's faces and the tool's corners and edges, where the scene wants them to touch and there are both.
+fn tool_features(
     scene: &Scene,
-    prepared: &PreparedPart,
+    surface: Option<&Arc<Surface>>,
     tool: &Tool,
-) -> Result<Option<(Surface, Features)>, Error> {
+) -> Result<Option<(Arc<Surface>, Features)>, Error> {
     /// Of the smallest face, the distance of the points on an edge: the edge then meets each face in one at least.
     const SPACING_SHARE: f64 = 0.5;
     let insists = match scene.accuracy.tool_features {
@@ -321,13 +344,13 @@ pub fn tool_edges(
     if !Features::has_some(tool) {
         return missing("the tool has neither corners nor sharp edges");
     }
-    let Some(surface) = prepared.contact_surface().map_err(in_scene)? else {
+    let Some(surface) = surface else {
         return missing("the contact groups of the mesh have no faces");
     };
     let sizes = (0..surface.n_faces()).map(|face| surface.size(face));
     let spacing = SPACING_SHARE * sizes.fold(f64::INFINITY, f64::min);
     let features = Features::new(tool, spacing).map_err(in_scene)?;
-    Ok(features.map(|features| (surface, features)))
+    Ok(features.map(|features| (Arc::clone(surface), features)))
 }
 
 /// m. A nanometre on a part of 10 kN/m is a hundred-thousandth of a newton.

@@ -2,12 +2,12 @@
 
 use glam::{DMat3, DVec3};
 
+use crate::contacts::Contact;
 use crate::error::Error;
-use crate::plane::Plane;
 
 /// Compliance of the part as 3 x 3 blocks; the caller owns the storage.
 pub trait ComplianceBlocks {
-    /// Displacement of candidate `row` per unit force at candidate `col`, m/N, part's frame.
+    /// Displacement of `row` per unit force at `col` (nodes, or places of contacts), m/N, part's frame.
     fn block(&self, row: usize, col: usize) -> DMat3;
 }
 
@@ -20,7 +20,7 @@ pub struct CouplingCompliance<'a> {
     pub reference: DVec3,
 }
 
-/// Writes the Delassus operator of the planes, column-major m x m.
+/// Writes the Delassus operator of the contacts, column-major m x m. `compliance`: between their places.
 ///
 /// ```text
 /// W = H_d C H_dᵀ + H_t K_c⁻¹ H_tᵀ      W_ij = n_iᵀ C_ij n_j + h_iᵀ K_c⁻¹ h_j,   h = [n, r × n]
@@ -34,28 +34,13 @@ pub struct CouplingCompliance<'a> {
 /// [`Error::Length`] unless `w` has m² entries.
 pub fn delassus_into(
     compliance: &impl ComplianceBlocks,
-    planes: &[Plane],
+    contacts: &[Contact],
     coupling: Option<CouplingCompliance>,
     w: &mut [f64],
 ) -> Result<(), Error> {
-    let m = planes.len();
-    delassus_block_into(compliance, planes, coupling, m, w)
-}
-
-/// As [`delassus_into`], for the leading block of an operator with `m` rows, more than there are planes: what follows are
-/// rows of another kind ([`crate::face_row`]).
-///
-/// # Errors
-/// [`Error::Length`] unless `w` has m² entries and m is no less than the number of planes.
-pub fn delassus_block_into(
-    compliance: &impl ComplianceBlocks,
-    planes: &[Plane],
-    coupling: Option<CouplingCompliance>,
-    m: usize,
-    w: &mut [f64],
-) -> Result<(), Error> {
-    check_size(w, m.max(planes.len()))?;
-    for_each_entry(compliance, planes, coupling, |i, j, entry| {
+    let m = contacts.len();
+    check_size(w, m)?;
+    for_each_entry(compliance, contacts, coupling, |i, j, entry| {
         w[j * m + i] = entry;
         w[i * m + j] = entry;
     });
@@ -73,31 +58,31 @@ pub(crate) fn check_size(w: &[f64], m: usize) -> Result<(), Error> {
     })
 }
 
-/// Tells W_ij of the planes for all i <= j.
+/// Tells W_ij of the contacts for all i <= j.
 #[inline]
 pub(crate) fn for_each_entry(
     compliance: &impl ComplianceBlocks,
-    planes: &[Plane],
+    contacts: &[Contact],
     coupling: Option<CouplingCompliance>,
     mut tell: impl FnMut(usize, usize, f64),
 ) {
-    for (j, plane_j) in planes.iter().enumerate() {
-        let twist = coupling.map(|coupling| twist_per_force(&coupling, plane_j));
-        for (i, plane_i) in planes[..=j].iter().enumerate() {
-            let block = compliance.block(plane_i.candidate as usize, plane_j.candidate as usize);
-            let mut displacement = block * plane_j.normal;
+    for (j, contact_j) in contacts.iter().enumerate() {
+        let twist = coupling.map(|coupling| twist_per_force(&coupling, contact_j));
+        for (i, contact_i) in contacts[..=j].iter().enumerate() {
+            let block = compliance.block(contact_i.place as usize, contact_j.place as usize);
+            let mut displacement = block * contact_j.normal;
             if let (Some(coupling), Some((translation, rotation))) = (&coupling, twist) {
                 // (r × n) · θ = n · (θ × r): the point of the tool at i moves away.
-                displacement += translation + rotation.cross(plane_i.point - coupling.reference);
+                displacement += translation + rotation.cross(contact_i.point - coupling.reference);
             }
-            tell(i, j, plane_i.normal.dot(displacement));
+            tell(i, j, contact_i.normal.dot(displacement));
         }
     }
 }
 
-/// K_c⁻¹ h of one plane: how far the tool yields to a unit normal force.
-pub(crate) fn twist_per_force(coupling: &CouplingCompliance, plane: &Plane) -> (DVec3, DVec3) {
-    let row = plane.tool_row(coupling.reference);
+/// K_c⁻¹ h of one contact: how far the tool yields to a unit normal force.
+fn twist_per_force(coupling: &CouplingCompliance, contact: &Contact) -> (DVec3, DVec3) {
+    let row = contact.tool_row(coupling.reference);
     let twist = coupling
         .matrix
         .map(|line| line.iter().zip(&row).map(|(c, h)| c * h).sum::<f64>());
@@ -140,12 +125,12 @@ mod tests {
         Blocks(blocks)
     }
 
-    fn planes(candidates: &[u32], next: &mut impl FnMut() -> f64) -> Vec<Plane> {
+    fn contacts(places: &[u32], next: &mut impl FnMut() -> f64) -> Vec<Contact> {
         let mut vector = || DVec3::new(next(), next(), next());
-        candidates
+        places
             .iter()
-            .map(|&candidate| Plane {
-                candidate,
+            .map(|&place| Contact {
+                place,
                 gap: 0.0,
                 normal: vector().normalize(),
                 point: vector(),
@@ -156,9 +141,9 @@ mod tests {
     #[test]
     fn delassus_is_the_product_of_whole_matrices() {
         let mut next = numbers(1);
-        let (n, candidates) = (5, [4, 0, 2, 3]);
+        let (n, places) = (5, [4, 0, 2, 3]);
         let blocks = compliance(n, &mut next);
-        let planes = planes(&candidates, &mut next);
+        let contacts = contacts(&places, &mut next);
         let half: [[f64; 6]; 6] = std::array::from_fn(|_| std::array::from_fn(|_| next()));
         let coupling_matrix: [[f64; 6]; 6] = std::array::from_fn(|i| {
             std::array::from_fn(|j| (0..6).map(|k| half[i][k] * half[j][k]).sum())
@@ -167,22 +152,22 @@ mod tests {
             matrix: &coupling_matrix,
             reference: DVec3::new(0.1, 0.2, 0.3),
         };
-        let m = planes.len();
+        let m = contacts.len();
         let mut w = vec![f64::NAN; m * m];
-        delassus_into(&blocks, &planes, Some(coupling), &mut w).unwrap();
+        delassus_into(&blocks, &contacts, Some(coupling), &mut w).unwrap();
         for i in 0..m {
             for j in 0..m {
                 // The part's own term by scalars, the tool's by its rows.
                 let mut expected = 0.0;
                 for a in 0..3 {
                     for b in 0..3 {
-                        let block = blocks.0[candidates[i] as usize][candidates[j] as usize];
-                        expected += planes[i].normal[a] * block.col(b)[a] * planes[j].normal[b];
+                        let block = blocks.0[places[i] as usize][places[j] as usize];
+                        expected += contacts[i].normal[a] * block.col(b)[a] * contacts[j].normal[b];
                     }
                 }
                 let (hi, hj) = (
-                    planes[i].tool_row(coupling.reference),
-                    planes[j].tool_row(coupling.reference),
+                    contacts[i].tool_row(coupling.reference),
+                    contacts[j].tool_row(coupling.reference),
                 );
                 for a in 0..6 {
                     for b in 0..6 {
@@ -201,22 +186,22 @@ mod tests {
         let blocks = Blocks(vec![vec![DMat3::ZERO; 2]; 2]);
         let mut matrix = [[0.0; 6]; 6];
         matrix[2][2] = 2.0;
-        let plane = |candidate, x| Plane {
-            candidate,
+        let contact = |place, x| Contact {
+            place,
             gap: 0.0,
             normal: DVec3::Z,
             point: DVec3::new(x, 0.0, 0.0),
         };
-        let planes = [plane(0, 0.0), plane(1, 5.0)];
+        let contacts = [contact(0, 0.0), contact(1, 5.0)];
         let coupling = CouplingCompliance {
             matrix: &matrix,
             reference: DVec3::ZERO,
         };
         let mut w = [0.0; 4];
-        delassus_into(&blocks, &planes, Some(coupling), &mut w).unwrap();
+        delassus_into(&blocks, &contacts, Some(coupling), &mut w).unwrap();
         assert_eq!(w, [2.0; 4]);
-        delassus_into(&blocks, &planes, None, &mut w).unwrap();
+        delassus_into(&blocks, &contacts, None, &mut w).unwrap();
         assert_eq!(w, [0.0; 4]);
-        assert!(delassus_into(&blocks, &planes, None, &mut [0.0; 3]).is_err());
+        assert!(delassus_into(&blocks, &contacts, None, &mut [0.0; 3]).is_err());
     }
 }

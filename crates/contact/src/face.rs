@@ -44,6 +44,15 @@ impl FaceOrder {
         }
     }
 
+    /// Nodes on an edge between its vertices.
+    pub fn n_on_edge(self) -> usize {
+        match self {
+            Self::Linear => 0,
+            Self::Quadratic => 1,
+            Self::Cubic => 2,
+        }
+    }
+
     /// Local coordinates of the nodes; the first [`FaceOrder::n_nodes`] entries are set.
     pub fn node_coordinates(self) -> [[f64; 3]; MAX_FACE_NODES] {
         const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
@@ -51,11 +60,8 @@ impl FaceOrder {
         for v in 0..3 {
             places[v][v] = 1.0;
         }
-        let (n_on_edge, steps) = match self {
-            Self::Linear => (0, 1.0),
-            Self::Quadratic => (1, 2.0),
-            Self::Cubic => (2, 3.0),
-        };
+        let n_on_edge = self.n_on_edge();
+        let steps = (n_on_edge + 1) as f64;
         for (e, [a, b]) in EDGES.into_iter().enumerate() {
             for k in 0..n_on_edge {
                 let share = (k + 1) as f64 / steps;

@@ -64,16 +64,15 @@ use std::time::Instant;
 
 pub use certificate::{Certificate, check};
 pub use problem::Problem;
-pub(crate) use run::run;
 
 use crate::error::Error;
-use crate::lcp::{self, Scalar};
+use crate::lcp;
 
 /// Budgets and tolerances of [`solve`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// The natural residual ([`Certificate::natural_residual`]) up to which an answer counts as solved, no unit.
-    /// 1e-8 in `f64`; Newton's method usually ends far below.
+    /// 1e-8; Newton's method usually ends far below.
     pub tolerance: f64,
     /// Sweeps over the contacts, each about 9 n² operations for n contacts. 200.
     pub max_sweeps: usize,
@@ -83,22 +82,15 @@ pub struct Settings {
     pub deadline: Option<Instant>,
 }
 
-impl Settings {
-    /// The defaults for numbers of type T: the tolerance is 1e-8 in `f64` and 1e-4 in `f32`.
-    pub fn of<T: Scalar>() -> Self {
+impl Default for Settings {
+    fn default() -> Self {
         Self {
             // A slip direction has half the digits where slip is about to start.
-            tolerance: T::FRICTION_TOLERANCE,
+            tolerance: 1e-8,
             max_sweeps: 200,
             max_newton_steps: 20,
             deadline: None,
         }
-    }
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self::of::<f64>()
     }
 }
 
@@ -138,35 +130,35 @@ pub struct Solution {
 
 /// Memory of the solver, for up to `capacity` contacts: about 90 capacity² numbers.
 #[derive(Debug, Clone)]
-pub struct Scratch<T: Scalar = f64> {
+pub struct Scratch {
     capacity: usize,
-    lcp: lcp::Scratch<T>,
-    normal_matrix: Vec<T>,
-    normal_q: Vec<T>,
-    normal_force: Vec<T>,
-    normal_gap: Vec<T>,
+    lcp: lcp::Scratch,
+    normal_matrix: Vec<f64>,
+    normal_q: Vec<f64>,
+    normal_force: Vec<f64>,
+    normal_gap: Vec<f64>,
     states: Vec<State>,
     /// Slip direction of each contact, where the next local solve starts.
-    directions: Vec<[T; 2]>,
-    best: Vec<T>,
-    swept: Vec<T>,
-    newton: newton::Scratch<T>,
+    directions: Vec<[f64; 2]>,
+    best: Vec<f64>,
+    swept: Vec<f64>,
+    newton: newton::Scratch,
 }
 
-impl<T: Scalar> Scratch<T> {
+impl Scratch {
     /// Memory for problems of up to `capacity` contacts.
     pub fn new(capacity: usize) -> Self {
         Self {
             capacity,
             lcp: lcp::Scratch::new(capacity),
-            normal_matrix: vec![T::zero(); capacity * capacity],
-            normal_q: vec![T::zero(); capacity],
-            normal_force: vec![T::zero(); capacity],
-            normal_gap: vec![T::zero(); capacity],
+            normal_matrix: vec![0.0; capacity * capacity],
+            normal_q: vec![0.0; capacity],
+            normal_force: vec![0.0; capacity],
+            normal_gap: vec![0.0; capacity],
             states: Vec::with_capacity(capacity),
             directions: Vec::with_capacity(capacity),
-            best: vec![T::zero(); 3 * capacity],
-            swept: vec![T::zero(); 3 * capacity],
+            best: vec![0.0; 3 * capacity],
+            swept: vec![0.0; 3 * capacity],
             newton: newton::Scratch::new(3 * capacity),
         }
     }
@@ -191,13 +183,13 @@ impl<T: Scalar> Scratch<T> {
 /// # Errors
 /// [`Error::Capacity`], or [`Error::Length`] if `forces` or `slip` do not have three entries per contact, or
 /// [`Error::NotFinite`] if a force to start from is not finite.
-pub fn solve<T: Scalar>(
-    problem: &Problem<T>,
+pub fn solve(
+    problem: &Problem,
     settings: &Settings,
-    scratch: &mut Scratch<T>,
+    scratch: &mut Scratch,
     is_warm: bool,
-    forces: &mut [T],
-    slip: &mut [T],
+    forces: &mut [f64],
+    slip: &mut [f64],
 ) -> Result<Solution, Error> {
-    T::solve_friction(problem, settings, scratch, is_warm, forces, slip)
+    run::run(problem, settings, scratch, is_warm, forces, slip)
 }

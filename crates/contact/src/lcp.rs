@@ -41,7 +41,7 @@
 //!
 //! If M is symmetric positive definite, z is unique. If it is semidefinite (more contacts than the part has ways to
 //! give), w and M z are unique, and the solver returns one of the many z. Then M_FF has no inverse, and
-//! E = 1e-12 diag(M) is added while the active set is sought (1e-5 in `f32`). What that changes is known row by row: an
+//! E = 1e-12 diag(M) is added while the active set is sought. What that changes is known row by row: an
 //! answer of the changed problem misses the true one by w_i of 1e-12 M_ii z_i. Proximal steps on the true M
 //! then take it away again: z ← answer for q - E z. Where M_FF keeps its digits nothing is added at all.
 //!
@@ -49,24 +49,25 @@
 //!
 //! | method | for which M | ends | cost |
 //! | --- | --- | --- | --- |
-//! | [`BlockPivoting`] | positive principal minors (all positive definite) | always, by Murty's rule; 1 to 5 rounds on contact problems | one factorisation, then O(k m²) for k exchanged rows |
-//! | [`ActiveSet`] | symmetric positive semidefinite | always: its energy falls | O(m²) a pivot |
-//! | [`Lemke`] | any | with a solution or on a ray; a ray proves that there is none if M is copositive-plus | O(m²) a pivot |
-//! | [`GaussSeidel`] | symmetric positive semidefinite | in the limit | O(m²) a sweep |
+//! | [`BlockPivoting`] | positive definite | always, by Murty's rule; 1 to 5 rounds on contact problems | one factorisation, then O(k m²) for k exchanged rows |
+//! | [`ActiveSet`] | positive semidefinite | always: its energy falls | O(m²) a pivot |
+//! | [`GaussSeidel`] | positive semidefinite | in the limit | O(m²) a sweep |
+//!
+//! All are for symmetric M, as that of frictionless contact is, and refuse another. Coulomb friction makes the problem
+//! unsymmetric where the cone is cut into a polygon; [`crate::friction`] solves it on the cone itself.
 //!
 //! *Block principal pivoting* guesses an active set, solves for its forces, and then moves every active
 //! row with a pulling force out and every other row with a closed gap in, all at once. Contact
 //! problems are done after a few rounds. If the number of wrong rows stops falling only the last wrong row moves
 //! (Murty's rule). That ends on every matrix whose principal minors are positive, but perhaps after 2^m rounds: hence
 //! the budgets of [`Settings`]. *Active-set* pivoting moves one row at a time, downhill in energy, so that it cannot
-//! cycle even on singular M. *Lemke's method* walks along the edges of a polyhedron from a start that is easy; with the
-//! lexicographic rule it cannot cycle either. *Projected Gauss-Seidel* sets each row right in turn and starts over;
-//! it is never exact, but always has something to show.
+//! cycle even on singular M. *Projected Gauss-Seidel* sets each row right in turn and starts over; it is never exact,
+//! but always has something to show.
 //!
-//! [`Automatic`], which is what [`solve`] runs, is a chain of them. Symmetric positive semi-definite M: block pivoting
-//! from a warm start; if its budget ends, single pivots; if all that fails, Gauss-Seidel and the best answer seen, flagged
-//! [`Status::Budget`]. Any other M: block pivoting while the diagonal is positive, then Lemke's method.
-//! Nothing allocates after [`Scratch::new`], and equal input gives equal bits (unless a deadline is set).
+//! [`Automatic`], which is what [`solve`] runs, is a chain of them: block pivoting from a warm start; if its budget ends,
+//! single pivots; if all that fails, Gauss-Seidel and the best answer seen, flagged [`Status::Budget`] unless it is a
+//! solution, or [`Status::Indefinite`] where M is not what it should be. Nothing allocates after [`Scratch::new`], and
+//! equal input gives equal bits (unless a deadline is set).
 //!
 //! # From step to step
 //!
@@ -98,7 +99,7 @@
 //!
 //! Sources: Cottle, Pang, Stone, The Linear Complementarity Problem (1992); Murty (1974) for the rule of
 //! the last row; Júdice and Pires (1994) for block pivoting; Lawson and Hanson (1974) for the active set;
-//! Lemke (1965); Rockafellar (1976) for proximal steps; Gill, Golub, Murray and Saunders (1974) for factors
+//! Rockafellar (1976) for proximal steps; Gill, Golub, Murray and Saunders (1974) for factors
 //! that change by a row.
 
 mod active_set;
@@ -106,22 +107,19 @@ mod certificate;
 mod dense;
 mod gauss_seidel;
 mod ldl;
-mod lemke;
-mod lu;
 mod pivoting;
 mod problem;
 mod run;
-mod scalar;
 mod scaling;
 mod solver;
 
 use std::time::Instant;
 
+pub(crate) use certificate::GOAL;
 pub use certificate::{Certificate, check};
 pub(crate) use dense::gaps_into;
 pub use problem::Problem;
-pub use scalar::Scalar;
-pub use solver::{ActiveSet, Automatic, BlockPivoting, GaussSeidel, Lemke, Solver};
+pub use solver::{ActiveSet, Automatic, BlockPivoting, GaussSeidel, Solver};
 
 use crate::error::Error;
 use pivoting::Basis;
@@ -136,7 +134,7 @@ pub struct Settings {
     /// Changes of the active set in block principal pivoting. Contact problems need 0 to 3 from a warm start,
     /// 1 to 5 from none. 30 leaves room for the Murty steps.
     pub max_rounds: usize,
-    /// Single pivots after that (active set or Lemke), each about m² operations. 5000 is enough
+    /// Single pivots of the active-set method after that, each about m² operations. 5000 is enough
     /// for several hundred rows; lower it where time is short.
     pub max_pivots: usize,
     /// Gauss-Seidel sweeps after that, each about m times the rows that change. 500.
@@ -147,17 +145,6 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// The defaults for numbers of type T: the tolerance is 1e-10 in `f64` and 1e-5 in `f32`.
-    pub fn of<T: Scalar>() -> Self {
-        Self {
-            tolerance: T::TOLERANCE,
-            max_rounds: 30,
-            max_pivots: 5000,
-            max_sweeps: 500,
-            deadline: None,
-        }
-    }
-
     fn is_over(&self) -> bool {
         self.deadline
             .is_some_and(|deadline| Instant::now() >= deadline)
@@ -166,7 +153,13 @@ impl Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self::of::<f64>()
+        Self {
+            tolerance: 1e-10,
+            max_rounds: 30,
+            max_pivots: 5000,
+            max_sweeps: 500,
+            deadline: None,
+        }
     }
 }
 
@@ -179,7 +172,7 @@ pub enum Start<'a> {
     /// From these rows, one flag each: those with z > 0 in the step before, carried across by candidate.
     Rows(&'a [bool]),
     /// From rows and factor of the last solve with this scratch. M must be what it was then; if it is not, the certificate
-    /// finds out and the solve starts again, cold. For M that is not symmetric, or another m, the same as [`Start::Cold`].
+    /// finds out and the solve starts again, cold. For another m the same as [`Start::Cold`].
     Kept,
 }
 
@@ -193,8 +186,8 @@ pub enum Status {
     /// The proof is a y ≥ 0 with Mᵀ y ≤ 0 and qᵀ y < 0 (to 1e-9 of the terms summed), because then
     /// yᵀ w < 0 for every z ≥ 0.
     NoSolution,
-    /// Lemke's method ended on a ray and no proof of the above was found. `z` is the best answer seen.
-    Ray,
+    /// M is not positive semi-definite, by more than round-off, and no solution was found. `z` is the best answer seen.
+    Indefinite,
     /// The budget ended. `z` is the best answer seen, its certificate says how good.
     Budget,
 }
@@ -208,8 +201,6 @@ pub enum Method {
     BlockPivoting,
     /// Single pivots of the active-set method.
     ActiveSet,
-    /// Lemke's method.
-    Lemke,
     /// Projected Gauss-Seidel.
     GaussSeidel,
 }
@@ -231,40 +222,35 @@ pub struct Solution {
     pub sweeps: usize,
 }
 
-/// Memory of the solvers, for up to `capacity` rows: 8 capacity² bytes (4 in `f32`) and a little.
+/// Memory of the solvers, for up to `capacity` rows: 8 capacity² bytes and a little.
 #[derive(Debug, Clone)]
-pub struct Scratch<T: Scalar = f64> {
+pub struct Scratch {
     capacity: usize,
-    /// Factor or tableau, whichever is at work.
-    dense: Vec<T>,
-    ldl: ldl::LdlState<T>,
-    lu_rows: Vec<u32>,
-    basis: Basis<T>,
+    /// The factor.
+    dense: Vec<f64>,
+    ldl: ldl::LdlState,
+    basis: Basis,
     /// Scaled size of each row, sqrt(M_ii).
-    scale: Vec<T>,
-    unit: T,
-    center: Vec<T>,
-    best_z: Vec<T>,
-    trial: Vec<T>,
-    integers: Vec<u32>,
+    scale: Vec<f64>,
+    unit: f64,
+    center: Vec<f64>,
+    best_z: Vec<f64>,
+    trial: Vec<f64>,
 }
 
-impl<T: Scalar> Scratch<T> {
+impl Scratch {
     /// Memory for problems of up to `capacity` rows.
     pub fn new(capacity: usize) -> Self {
-        let n_dense = ldl::memory_len(capacity).max(lemke::tableau_len(capacity));
         Self {
             capacity,
-            dense: vec![T::zero(); n_dense],
+            dense: vec![0.0; ldl::memory_len(capacity)],
             ldl: ldl::LdlState::new(capacity),
-            lu_rows: Vec::with_capacity(capacity),
             basis: Basis::new(capacity),
-            scale: vec![T::zero(); capacity],
-            unit: T::one(),
-            center: vec![T::zero(); capacity],
-            best_z: vec![T::zero(); capacity],
-            trial: vec![T::zero(); capacity + 1],
-            integers: vec![0; lemke::n_integers(capacity)],
+            scale: vec![0.0; capacity],
+            unit: 1.0,
+            center: vec![0.0; capacity],
+            best_z: vec![0.0; capacity],
+            trial: vec![0.0; capacity],
         }
     }
 
@@ -279,14 +265,14 @@ impl<T: Scalar> Scratch<T> {
 /// Does not allocate, lock or log.
 ///
 /// # Errors
-/// [`Error::Capacity`], or [`Error::Length`] if the start, `z` or `w` do not have m entries.
-pub fn solve<T: Scalar>(
-    problem: &Problem<T>,
+/// [`Error::NotSymmetric`]; [`Error::Capacity`]; [`Error::Length`] if the start, `z` or `w` do not have m entries.
+pub fn solve(
+    problem: &Problem,
     settings: &Settings,
-    scratch: &mut Scratch<T>,
+    scratch: &mut Scratch,
     start: Start,
-    z: &mut [T],
-    w: &mut [T],
+    z: &mut [f64],
+    w: &mut [f64],
 ) -> Result<Solution, Error> {
     Automatic.solve(problem, settings, scratch, start, z, w)
 }

@@ -13,6 +13,7 @@
 
 use glam::DVec3;
 
+use crate::contacts::{Place, Witness};
 use crate::error::{Error, check_positive};
 use crate::face::{Face, FaceOrder, MAX_FACE_NODES, Nearest};
 
@@ -41,6 +42,8 @@ pub struct Surface {
     size: Vec<f64>,
     neighbours: Vec<[u32; 3]>,
     is_smooth: Vec<[bool; 3]>,
+    /// By edge: its ends, then the nodes between.
+    edges: Vec<u32>,
     /// Faces of candidate c: `faces_of[first_of[c]..first_of[c + 1]]`.
     first_of: Vec<u32>,
     faces_of: Vec<u32>,
@@ -83,6 +86,7 @@ impl Surface {
             size: Vec::with_capacity(faces.len()),
             neighbours: vec![[NO_FACE; 3]; faces.len()],
             is_smooth: vec![[false; 3]; faces.len()],
+            edges: Vec::new(),
             first_of: vec![0; rest.len() + 1],
             faces_of: Vec::new(),
         };
@@ -129,6 +133,8 @@ impl Surface {
             }
         }
         for users in sides.values() {
+            let (face, opposite_of) = users[0];
+            self.push_edge(face as usize, opposite_of);
             // More than two do not meet on the surface of a body; then each ends there.
             let [(f, k), (g, l)] = users[..] else {
                 continue;
@@ -145,6 +151,19 @@ impl Surface {
                 self.is_smooth[from as usize][edge] = is_smooth;
             }
         }
+    }
+
+    /// The edge of a face that is opposite of a vertex.
+    fn push_edge(&mut self, face: usize, opposite_of: usize) {
+        let nodes = self.nodes_of(face);
+        let (from, to) = ((opposite_of + 1) % 3, (opposite_of + 2) % 3);
+        let n_between = self.order.n_on_edge();
+        let first = 3 + n_between * from;
+        let edge: Vec<u32> = [nodes[from], nodes[to]]
+            .into_iter()
+            .chain(nodes[first..first + n_between].iter().copied())
+            .collect();
+        self.edges.extend(edge);
     }
 
     fn list_faces(&mut self) {
@@ -190,6 +209,23 @@ impl Surface {
     pub fn nodes_of(&self, face: usize) -> &[u32] {
         let n = self.order.n_nodes();
         &self.nodes[n * face..n * (face + 1)]
+    }
+
+    /// Number of edges between the faces' vertices.
+    pub fn n_edges(&self) -> usize {
+        self.edges.len() / (2 + self.order.n_on_edge())
+    }
+
+    /// Nodes of an edge: its ends, then those between, from the first end to the second.
+    pub fn nodes_of_edge(&self, edge: usize) -> &[u32] {
+        let n = 2 + self.order.n_on_edge();
+        &self.edges[n * edge..n * (edge + 1)]
+    }
+
+    /// Rest position of a held node, m; none for a candidate.
+    pub fn held(&self, node: u32) -> Option<DVec3> {
+        let k = (node as usize).checked_sub(self.n_candidates)?;
+        self.held.get(k).copied()
     }
 
     /// Whether a node of a face is a candidate; held ones do not move.
@@ -246,6 +282,28 @@ impl Surface {
                 None => position_of(node),
             };
         }
+    }
+
+    /// The place of a face that is nearest to a point of the tool (`local`, tool's frame, m), which is its witness.
+    /// `displacement_of`: of a candidate, m.
+    pub fn place(
+        &self,
+        face: usize,
+        key: u32,
+        nearest: &Nearest,
+        local: DVec3,
+        mut displacement_of: impl FnMut(u32) -> DVec3,
+    ) -> Place {
+        let nodes = self.nodes_of(face).iter().copied();
+        let weights = nodes
+            .zip(nearest.weights)
+            .filter(|share| self.is_candidate(share.0));
+        let mut place = Place::new(key, nearest.position, weights);
+        place.rest -= place.displacement(&mut displacement_of);
+        place.seen_by(Witness::Point {
+            local,
+            normal: -nearest.outward,
+        })
     }
 
     /// Whether a point lies within the border of a face, or, if the face is to hold it, no more than `hold` (m) beyond.

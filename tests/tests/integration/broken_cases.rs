@@ -128,7 +128,7 @@ fn arrays_whose_shapes_do_not_agree_are_named_with_both() {
             fs::write(path, bytes).unwrap();
         }
     };
-    let case = "lcp/murty-16";
+    let case = "lcp/fathi-16";
     refused_after(
         case,
         "M.npy",
@@ -182,7 +182,7 @@ fn arrays_whose_shapes_do_not_agree_are_named_with_both() {
 
 #[test]
 fn misspelt_keys_of_all_files_are_named() {
-    let lcp = "lcp/murty-16";
+    let lcp = "lcp/fathi-16";
     refused_after(
         lcp,
         "problem.json",

@@ -10,6 +10,7 @@ fn every_file_that_a_document_links_to_exists() {
         "README.md",
         "ARCHITECTURE.md",
         "CONTRIBUTING.md",
+        "docs/decisions.md",
         "docs/scene.md",
         "scenes/README.md",
     ] {

@@ -12,7 +12,7 @@ use contact::tool::{Features, Mesh, Tool};
 use device::VirtualCoupling;
 use glam::{DMat3, DQuat, DVec3};
 use glamx::DPose3;
-use snapin::engine::{ContactPart, Engine};
+use snapin::engine::{ContactPart, Engine, Plan};
 use snapin::scene::Scene;
 use snapin::setup;
 use snapin_tests::root;
@@ -173,7 +173,7 @@ impl BruteForce<'_> {
 
 /// The rule of `contact::surface`, with every point asked at every face.
 struct SlowEdges {
-    surface: Surface,
+    surface: Arc<Surface>,
     features: Features,
     /// By feature: the face that it was at, and the step.
     memory: Vec<(u32, u64)>,
@@ -185,7 +185,7 @@ struct SlowEdges {
 }
 
 impl SlowEdges {
-    fn new((surface, features): (Surface, Features)) -> Self {
+    fn new((surface, features): (Arc<Surface>, Features)) -> Self {
         Self {
             memory: vec![(NO_FACE, 0); features.points().len()],
             surface,
@@ -361,14 +361,12 @@ fn compare(name: &str, as_mesh: bool, deepest: f64) {
     let largest_motion = 0.2 * settings.max_stride;
     let coupling = *usual.coupling().unwrap();
     let part = prepared.contact_part();
-    let mut fast = Engine::new(Arc::clone(&part), tool.clone(), Some(coupling), settings).unwrap();
-    let mut edges = None;
-    if !as_mesh
-        && let Some((surface, features)) = setup::tool_edges(&scene, &prepared, &tool).unwrap()
-    {
-        edges = Some(SlowEdges::new((surface.clone(), features.clone())));
-        fast = fast.with_edges(surface, features);
+    let mut plan = Plan::new(Arc::clone(&part), tool.clone(), Some(coupling), settings);
+    if !as_mesh {
+        plan = setup::with_contact(&scene, &prepared, plan).unwrap();
     }
+    let edges = plan.features.clone().map(SlowEdges::new);
+    let mut fast = Engine::new(plan).unwrap();
     let has_edges = edges.is_some();
     let mut slow = BruteForce {
         part: &part,

@@ -14,6 +14,7 @@ mod fast_path;
 mod interior;
 mod multiply;
 mod p_method;
+mod places;
 mod plausibility;
 mod random_scenes;
 mod readers;

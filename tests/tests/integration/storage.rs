@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use contact::tool::Tool;
 use glamx::DPose3;
-use snapin::engine::{ContactPart, Engine};
+use snapin::engine::{ContactPart, Engine, Plan};
 use snapin::prepare::{ColumnChoice, PreparedCompliance, PreparedPart};
 use snapin::scene::{Adaptive, Columns, FreeNodes, Scalar, Scene};
 use snapin::setup;
@@ -119,8 +119,14 @@ fn columns_that_come_late_are_eased_in_from_another_thread() {
     ));
     let usual = setup::engine(&scene, &prepared, tool.clone()).unwrap();
     let (settings, coupling) = (usual.settings().clone(), usual.coupling().copied());
-    let mut reference = Engine::new(complete, tool.clone(), coupling, settings.clone()).unwrap();
-    let mut engine = Engine::new(Arc::clone(&part), tool, coupling, settings).unwrap();
+    let mut reference = Engine::new(Plan::new(
+        complete,
+        tool.clone(),
+        coupling,
+        settings.clone(),
+    ))
+    .unwrap();
+    let mut engine = Engine::new(Plan::new(Arc::clone(&part), tool, coupling, settings)).unwrap();
     let start = scene.tool.pose_part_tool;
     let at = |share: f64| DPose3 {
         translation: start.translation + share * scene.drive.travel * scene.drive.direction,

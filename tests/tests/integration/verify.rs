@@ -25,7 +25,7 @@ fn every_case_is_within_its_tolerance() {
         "cantilever-tet10-nu030",
         "clip-coarse",
         "error-no-fixed",
-        "lcp/murty-16",
+        "lcp/fathi-16",
     ];
     for name in folders {
         assert!(
@@ -73,6 +73,21 @@ fn a_wrong_expectation_fails_with_exit_code_1() {
     let result = snapin(&["verify", arg(dir.path())]);
     assert_eq!(result.code, 1, "{}", result.out);
     assert!(result.out.contains("FAIL strain_energy"), "{}", result.out);
+}
+
+/// The polygonal form of friction, a problem that the solver is not made for.
+#[test]
+fn a_problem_with_an_unsymmetric_matrix_is_not_supported_and_says_why() {
+    let case = root().join("crates/contact/tests/data/lcp/friction-4x4");
+    let result = snapin(&["verify", arg(&case)]);
+    assert_eq!(result.code, 1);
+    for words in [
+        "friction-4x4: not supported",
+        "needs a symmetric matrix",
+        "on its cone",
+    ] {
+        assert!(result.out.contains(words), "{words}: {}", result.out);
+    }
 }
 
 #[test]

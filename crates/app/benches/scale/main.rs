@@ -30,7 +30,7 @@ use contact::tool::{DistanceField, Mesh, Sphere, Tool};
 use glam::DVec3;
 use glamx::DPose3;
 use half_space::{CELL, half_space, half_space_near};
-use snapin::engine::{ContactIterations, ContactPart, Engine, EngineSettings, Stage};
+use snapin::engine::{ContactIterations, ContactPart, Engine, EngineSettings, Plan, Stage};
 use snapin::machine::Machine;
 
 /// m, motion of the tool in one step of 1 ms.
@@ -62,7 +62,7 @@ fn measure(part: &Arc<ContactPart>, tool: Tool, radius: f64, contacts: f64) -> M
         lcp: contact::lcp::Settings::default(),
         max_stride: 0.02 * 2.0 * radius,
     };
-    let mut engine = Engine::new(Arc::clone(part), tool, None, settings).unwrap();
+    let mut engine = Engine::new(Plan::new(Arc::clone(part), tool, None, settings)).unwrap();
     let mut stages = vec![Vec::new(); Stage::ALL.len()];
     let (mut totals, mut n_contacts, mut near, mut passes) = (vec![], 0, 0, 0);
     for step in 0..STEPS {

@@ -23,11 +23,12 @@ mod freeze;
 
 use bytemuck::cast_slice;
 use contact::lcp;
-use contact::plane::{Plane, wrench_on_tool};
 use contact::tool::Tool;
+use contact::{Contact, Place, wrench_on_tool};
 use glam::{DMat3, DVec3};
 use glamx::DPose3;
 
+use super::forces::Loads;
 use super::held::Held;
 use super::{ActiveContact, StepReport};
 
@@ -45,15 +46,17 @@ pub struct FrozenProblem {
     reference: DVec3,
     held: Held,
     reach_of_rotation: f64,
-    /// m, that part and tool may move before a node without a row can touch.
+    /// m, that part and tool may move before a place without a row can touch.
     margin: f64,
     tool: Tool,
     /// Passes of a tick at most; with none the planes are kept.
     most_passes: u32,
     /// As frozen, or as the last answer has them.
-    planes: Vec<Plane>,
-    /// m, by row, of the node at rest.
-    rest: Vec<DVec3>,
+    contacts: Vec<Contact>,
+    /// By row.
+    places: Vec<Place>,
+    /// m, by row: where the last answer has it.
+    positions: Vec<DVec3>,
     /// C between rows, 3x3 column-major inside, block of rows i and j at j m + i; for gaps that are measured.
     blocks: Vec<f64>,
     /// h by row, of the frozen planes.
@@ -72,15 +75,14 @@ pub struct FrozenProblem {
     /// On the tool in the last answer.
     wrench: [f64; 6],
     gaps: Vec<f64>,
-    active: Vec<ActiveContact>,
+    loads: Loads,
     lcp: lcp::Scratch,
     settings: lcp::Settings,
     warm: Vec<bool>,
     last_tool_pose: DPose3,
     // What making it needs.
     candidates: Vec<u32>,
-    is_row: Vec<bool>,
-    extra: Vec<Plane>,
+    extra: Vec<Contact>,
 }
 
 /// Answer of a frozen problem.
@@ -96,7 +98,7 @@ pub struct Prediction {
 impl FrozenProblem {
     /// Rows of the problem.
     pub fn n_rows(&self) -> usize {
-        self.planes.len()
+        self.contacts.len()
     }
 
     /// m, that part and tool may move together before a node that has no row can touch.
@@ -109,9 +111,9 @@ impl FrozenProblem {
         &self.target
     }
 
-    /// Contacts that carry force in the last answer.
+    /// Nodes that carry force in the last answer.
     pub fn active_contacts(&self) -> &[ActiveContact] {
-        &self.active
+        &self.loads.active
     }
 
     /// Whether gaps are measured anew in every solve, or the planes kept.
@@ -179,14 +181,14 @@ impl FrozenProblem {
 
     /// Planes and q at the places of the last answer, with the tool as far from this target as from the last.
     fn measure_gaps(&mut self, target: &DPose3) {
-        let m = self.planes.len();
+        let m = self.contacts.len();
         let pose = self.held.pose(target, &self.deviation);
         self.reference = self.held.reference(target, &self.deviation);
         let blocks: &[DMat3] = cast_slice(&self.blocks[..9 * m * m]);
-        // By contact: columns lie side by side. First the places, in the planes' points.
-        for (plane, rest) in self.planes.iter_mut().zip(&self.rest) {
-            plane.point = *rest;
-        }
+        // By contact: columns lie side by side.
+        self.positions.clear();
+        self.positions
+            .extend(self.places.iter().map(|place| place.rest));
         self.q[..m].fill(0.0);
         for j in 0..m {
             let force = self.forces[j];
@@ -194,25 +196,25 @@ impl FrozenProblem {
                 continue;
             }
             // The normal of the last answer: it is renewed below, after all places are known.
-            let on_part = force * self.planes[j].normal;
+            let on_part = force * self.contacts[j].normal;
             let columns = blocks[j * m..][..m].iter();
             let columns = columns.zip(&self.w_matrix[j * m..][..m]);
-            for ((plane, q), (block, w)) in self.planes.iter_mut().zip(&mut self.q).zip(columns) {
-                plane.point += *block * on_part;
+            for ((x, q), (block, w)) in self.positions.iter_mut().zip(&mut self.q).zip(columns) {
+                *x += *block * on_part;
                 *q -= w * force;
             }
         }
-        for (plane, q) in self.planes.iter_mut().zip(&mut self.q) {
-            let contact = self.tool.signed_distance(&pose, plane.point);
+        let of_rows = self.places.iter().zip(&self.positions).zip(&mut self.q);
+        for (k, ((place, x), q)) in of_rows.enumerate() {
             // What is not finite shows in the certificate.
-            plane.gap = contact.signed_distance;
-            plane.normal = contact.normal;
-            *q += contact.signed_distance;
+            let contact = place.contact(k as u32, &self.tool, &pose, *x);
+            *q += contact.gap;
+            self.contacts[k] = contact;
         }
     }
 
     fn answer(&mut self, target: &DPose3, start: lcp::Start<'_>) -> Prediction {
-        let m = self.planes.len();
+        let m = self.contacts.len();
         let mut report = StepReport {
             stage_ns: Default::default(),
             passes: 1,
@@ -251,18 +253,15 @@ impl FrozenProblem {
                 }
             }
         }
-        self.active.clear();
-        for (plane, &force) in self.planes.iter().zip(&*forces) {
+        self.loads.clear();
+        report.contacts = 0;
+        for ((contact, place), &force) in self.contacts.iter().zip(&self.places).zip(&*forces) {
             if force > 0.0 {
-                self.active.push(ActiveContact {
-                    candidate: plane.candidate,
-                    normal_force: force,
-                    force_on_part: force * plane.normal,
-                });
+                report.contacts += 1;
+                self.loads.add(place, force, contact.normal);
             }
         }
-        report.contacts = self.active.len() as u32;
-        let (force, torque) = wrench_on_tool(&self.planes, forces, self.reference);
+        let (force, torque) = wrench_on_tool(&self.contacts, forces, self.reference);
         let wrench = [force.x, force.y, force.z, torque.x, torque.y, torque.z];
         self.deviation = self.held.deviation_under(&wrench);
         self.wrench = wrench;
@@ -271,11 +270,11 @@ impl FrozenProblem {
         report.coupling_wrench_on_tool =
             self.held.wrench_on_tool(target, &report.tool_pose, &wrench);
         self.last_tool_pose = report.tool_pose;
-        let of_rows = self.planes.iter().zip(&self.forces[..m]);
+        let of_rows = self.contacts.iter().zip(&self.forces[..m]);
         let by_part: f64 = of_rows
             .zip(self.forces_frozen.iter().zip(&self.yields))
-            .map(|((plane, force), (then, yields))| {
-                yields * (*force * plane.normal - *then).length()
+            .map(|((contact, force), (then, yields))| {
+                yields * (*force * contact.normal - *then).length()
             })
             .sum();
         let (from, to) = (&self.step.tool_pose, &report.tool_pose);

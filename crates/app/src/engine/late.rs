@@ -1,11 +1,11 @@
-//! Candidates that come near before their column is there: left out of the contact problem, and eased in when the column
-//! has come, so that the force does not jump.
+//! Places that come near before the columns of their nodes are there: left out of the contact problem, and eased in when
+//! the columns have come, so that the force does not jump.
 
-use contact::plane::Plane;
+use contact::{Contact, Place};
 
 use super::ContactPart;
 
-/// Steps in which a node that came late takes its place: 50 ms at 1 kHz, slower than a jolt is felt.
+/// Steps in which a place that came late takes its part: 50 ms at 1 kHz, slower than a jolt is felt.
 const EASE_STEPS: u32 = 50;
 
 /// Only made for parts whose columns are fetched.
@@ -16,15 +16,15 @@ pub(super) struct Late {
 
 #[derive(Debug)]
 struct Entry {
-    candidate: u32,
+    place: Place,
     /// m, how deep it was when it was last left out.
     depth: f64,
-    /// Steps until it is where it belongs; begins to fall once it has its column.
+    /// Steps until it is where it belongs; begins to fall once it has its columns.
     n_left: u32,
 }
 
 impl Late {
-    /// Memory for `capacity` candidates; those beyond it come in at once.
+    /// Memory for `capacity` places; those beyond it come in at once.
     pub(super) fn new(capacity: usize) -> Self {
         Self {
             entries: Vec::with_capacity(capacity),
@@ -36,48 +36,48 @@ impl Late {
         self.entries.clear();
     }
 
-    /// Once in a step: those with a column come nearer to their place.
+    /// Once in a step: those with their columns come nearer to their place.
     pub(super) fn begin_step(&mut self, part: &ContactPart) {
         self.entries.retain_mut(|entry| {
-            entry.n_left -= u32::from(part.is_taken_in(entry.candidate));
+            entry.n_left -= u32::from(has_columns(&entry.place, part));
             entry.n_left > 0
         });
     }
 
-    /// Takes out the planes of candidates without a column and opens the gaps of those that came late. Returns the
-    /// number taken out. Does not allocate.
-    pub(super) fn sort_out(&mut self, planes: &mut Vec<Plane>, part: &ContactPart) -> usize {
-        let before = planes.len();
-        planes.retain(|plane| {
-            let is_there = part.is_taken_in(plane.candidate);
-            if !is_there {
-                self.leave_out(plane);
-            }
-            is_there
-        });
+    /// Opens the gaps of those that came late.
+    pub(super) fn open(&self, places: &[Place], contacts: &mut [Contact]) {
         for entry in &self.entries {
             let open = entry.depth * f64::from(entry.n_left) / f64::from(EASE_STEPS);
-            let mut planes = planes.iter_mut();
-            if let Some(plane) = planes.find(|plane| plane.candidate == entry.candidate) {
-                plane.gap += open;
+            let key_of = |contact: &Contact| places[contact.place as usize].key;
+            let mut contacts = contacts.iter_mut();
+            if let Some(contact) = contacts.find(|contact| key_of(contact) == entry.place.key) {
+                contact.gap += open;
             }
         }
-        before - planes.len()
     }
 
-    fn leave_out(&mut self, plane: &Plane) {
-        let depth = (-plane.gap).max(0.0);
+    /// Notes a place that cannot be touched yet. Does not allocate.
+    pub(super) fn leave_out(&mut self, place: &Place, gap: f64) {
+        let depth = (-gap).max(0.0);
         let mut known = self.entries.iter_mut();
-        if let Some(entry) = known.find(|entry| entry.candidate == plane.candidate) {
-            entry.depth = depth;
+        if let Some(entry) = known.find(|entry| entry.place.key == place.key) {
+            (entry.place, entry.depth) = (*place, depth);
         } else if self.entries.len() < self.entries.capacity() {
             self.entries.push(Entry {
-                candidate: plane.candidate,
+                place: *place,
                 depth,
                 n_left: EASE_STEPS,
             });
         }
     }
+}
+
+/// Whether all nodes that move the place have their columns in this step.
+pub(super) fn has_columns(place: &Place, part: &ContactPart) -> bool {
+    place
+        .shares()
+        .iter()
+        .all(|(node, _)| part.is_taken_in(*node))
 }
 
 #[cfg(test)]
@@ -92,8 +92,9 @@ mod tests {
         let mut part = ContactPart::with_fetched(vec![DVec3::ZERO, DVec3::X], 2);
         let column = || Blocks::F64(Source::Owned(vec![1.0; 18]));
         assert!(part.insert(0, column()));
-        let plane = |candidate| Plane {
-            candidate,
+        let places = [Place::node(0, DVec3::ZERO), Place::node(1, DVec3::X)];
+        let contact = |place| Contact {
+            place,
             gap: -1e-3,
             normal: DVec3::Z,
             point: DVec3::ZERO,
@@ -106,11 +107,15 @@ mod tests {
             }
             part.take_in();
             late.begin_step(&part);
-            let mut planes = vec![plane(0), plane(1)];
-            let n_out = late.sort_out(&mut planes, &part);
-            assert_eq!(n_out, usize::from(step < 5));
-            assert_eq!(planes[0].gap, -1e-3);
-            gaps_of_second.extend(planes.get(1).map(|plane| plane.gap));
+            assert_eq!(has_columns(&places[1], &part), step >= 5);
+            let mut contacts = vec![contact(0), contact(1)];
+            if step < 5 {
+                late.leave_out(&places[1], contacts[1].gap);
+                contacts.pop();
+            }
+            late.open(&places, &mut contacts);
+            assert_eq!(contacts[0].gap, -1e-3);
+            gaps_of_second.extend(contacts.get(1).map(|contact| contact.gap));
         }
         // From open to its depth, in equal steps, and then it stays.
         assert_eq!(gaps_of_second.len(), 65);

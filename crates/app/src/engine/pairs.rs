@@ -17,8 +17,9 @@ pub(super) struct Pairs {
     capacity: usize,
     /// Block of the candidates in slots i and j at `j capacity + i`.
     blocks: Vec<DMat3>,
-    /// By slot: when it was last asked for, in calls of [`Self::ensure`].
+    /// By slot, and by candidate: when it was last asked for, in calls of [`Self::ensure`].
     asked_at: Vec<u64>,
+    counted_at: Vec<u64>,
     now: u64,
     /// Where the search for a slot to give away goes on.
     hand: usize,
@@ -32,6 +33,7 @@ impl Pairs {
             capacity,
             blocks: vec![DMat3::ZERO; capacity * capacity],
             asked_at: vec![0; capacity],
+            counted_at: vec![0; n_candidates],
             now: 0,
             hand: 0,
         }
@@ -54,8 +56,13 @@ impl Pairs {
         (slot != NONE).then_some(slot as usize)
     }
 
+    /// Slot of a candidate that was asked for last.
+    pub(super) fn slot_or_first(&self, candidate: u32) -> u32 {
+        self.slot(candidate).unwrap_or(0) as u32
+    }
+
     /// Room for more.
-    pub(super) fn n_left(&self) -> usize {
+    fn n_left(&self) -> usize {
         self.capacity - self.known.len()
     }
 
@@ -72,18 +79,23 @@ impl Pairs {
     /// False, and nothing is known, if there are more than fit.
     pub(super) fn ensure(
         &mut self,
-        candidates: impl ExactSizeIterator<Item = u32> + Clone,
+        candidates: impl Iterator<Item = u32> + Clone,
         part: &ContactPart,
     ) -> bool {
-        if candidates.len() > self.capacity {
-            self.clear();
-            return false;
-        }
         self.now += 1;
+        let mut n_asked = 0;
         for candidate in candidates.clone() {
+            let counted_at = &mut self.counted_at[candidate as usize];
+            if std::mem::replace(counted_at, self.now) != self.now {
+                n_asked += 1;
+            }
             if let Some(slot) = self.slot(candidate) {
                 self.asked_at[slot] = self.now;
             }
+        }
+        if n_asked > self.capacity {
+            self.clear();
+            return false;
         }
         for candidate in candidates {
             if self.slot(candidate).is_some() {

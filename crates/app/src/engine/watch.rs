@@ -24,6 +24,7 @@ use glamx::DPose3;
 
 use super::ContactPart;
 use super::clusters::Clusters;
+use super::forces::Loads;
 use super::part::Deformed;
 
 /// Share of a mesh tool's size from which on its box stands in for it: a mesh answers slowly.
@@ -65,6 +66,8 @@ pub(super) struct Watch {
     /// By cluster: what the forces on its members do in this look; zero but for those in `loaded`.
     loads: Vec<Load>,
     loaded: Vec<u32>,
+    /// Candidates whose own force changed since the last look, and by how much, N.
+    changed: Vec<(u32, f64)>,
     centre: DVec3,
     radius: f64,
 }
@@ -114,8 +117,8 @@ pub(super) struct State<'a> {
     pub(super) deformed: Deformed<'a>,
     pub(super) tool: &'a Tool,
     pub(super) tool_pose: &'a DPose3,
-    /// By candidate: carries force.
-    pub(super) is_active: &'a [bool],
+    /// Nodes that carry force.
+    pub(super) loads: &'a Loads,
 }
 
 impl Watch {
@@ -151,6 +154,7 @@ impl Watch {
             active_then: Vec::with_capacity(rest.len()),
             loads: vec![Load::default(); n_clusters],
             loaded: Vec::with_capacity(n_clusters),
+            changed: Vec::with_capacity(2 * rest.len()),
             radius: distances.fold(0.0, f64::max),
             centre,
         })
@@ -161,7 +165,7 @@ impl Watch {
         self.pose_then = None;
     }
 
-    /// Adds up the motion since the last look; [`Self::look`] has to follow.
+    /// Adds up the motion since the last look; [`Self::look`] or [`Self::pass_over`] has to follow.
     pub(super) fn advance(&mut self, state: State<'_>) {
         self.sum_loads(state);
         match self.pose_then {
@@ -169,6 +173,10 @@ impl Watch {
             None => self.begin(),
         }
         self.remember(state);
+    }
+
+    /// Finds the candidates that may be nearer than reach: [`Self::take_due`]. Does not allocate.
+    pub(super) fn look(&mut self, state: State<'_>) {
         self.visits.clear();
         let by_tool = self.by_tool;
         let sums = self.by_force.iter().zip(&self.visit_at).enumerate();
@@ -181,18 +189,24 @@ impl Watch {
             sums.filter(|(_, (by_force, at))| is_due(**by_force, **at))
                 .map(|(c, _)| c as u32),
         );
-    }
-
-    /// Finds the candidates that may be nearer than reach: [`Self::take_due`]. Does not allocate.
-    pub(super) fn look(&mut self, state: State<'_>) {
         self.due.clear();
         for k in 0..self.visits.len() {
             self.visit(self.visits[k] as usize, state);
         }
+        self.pass_over();
+    }
+
+    /// In place of a look: only the sums are wanted.
+    pub(super) fn pass_over(&mut self) {
         for &b in &self.loaded {
             self.loads[b as usize] = Load::default();
         }
         self.loaded.clear();
+    }
+
+    /// Candidates whose own force changed before the last look, and by how much, N.
+    pub(super) fn changed(&self) -> &[(u32, f64)] {
+        &self.changed
     }
 
     /// What the last look found, to be given back; each is to be answered with [`Self::postpone`] if it is not
@@ -263,6 +277,8 @@ impl Watch {
         let Deformed { part, active, .. } = state.deformed;
         let clusters = part.clusters();
         let (loads, loaded) = (&mut self.loads, &mut self.loaded);
+        let changed = &mut self.changed;
+        changed.clear();
         let mut add = |candidate: u32, change: DVec3, size: f64| {
             let b = clusters.cluster_of(candidate);
             let load = &mut loads[b];
@@ -270,6 +286,7 @@ impl Watch {
                 load.is_listed = true;
                 loaded.push(b as u32);
             }
+            changed.push((candidate, change.length()));
             load.change += change;
             load.changes += change.length();
             load.size += size;
@@ -279,7 +296,7 @@ impl Watch {
             add(contact.candidate, change, contact.force_on_part.length());
         }
         for &candidate in &self.active_then {
-            if !state.is_active[candidate as usize] {
+            if !state.loads.is_loaded(candidate) {
                 add(candidate, -self.force_then[candidate as usize], 0.0);
             }
         }

@@ -23,9 +23,11 @@ impl PreparedPart {
         if faces.is_empty() {
             return Ok(None);
         }
-        let mut number: HashMap<u32, u32> = loaded.candidates.iter().copied().zip(0..).collect();
+        // As the engine numbers them: those that may move, then those that are held.
+        let contact_nodes = loaded.candidates.iter().chain(&loaded.held).copied();
+        let mut number: HashMap<u32, u32> = contact_nodes.zip(0..).collect();
         let rest: Vec<DVec3> = loaded.candidates.iter().map(|n| place(*n)).collect();
-        let mut held = Vec::new();
+        let mut held = loaded.held_positions();
         for &node in faces.iter().flatten() {
             let next = number.len() as u32;
             number.entry(node).or_insert_with(|| {

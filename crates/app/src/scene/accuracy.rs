@@ -1,9 +1,32 @@
-//! What a scene asks of accuracy, and what it costs time.
+//! `[accuracy]`: what a scene asks of accuracy, and what it costs time.
+
+mod adaptive;
+mod iterations;
+mod preset;
+mod rates;
 
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::raw;
+use super::SceneError;
+use super::check::Check;
+use super::check::Range::Positive;
+use super::keys::{At, In, Length, Plain, Whole};
+use adaptive::AdaptiveKey;
+pub use adaptive::{Adaptive, FreeNodes};
+pub use iterations::ContactIterations;
+use iterations::IterationsKey;
+pub use preset::Preset;
+pub(super) use preset::WordOrKeys;
+pub use rates::Rates;
+use rates::RatesKey;
+
+const MAX_CONTACTS: u32 = 500;
+const MERGE_TOLERANCE: f64 = 0.05;
+
+/// Bend of an edge, as a share of the largest displacement, that a picture of a thousand pixels
+/// begins to show.
+const SEEN_BEND: f64 = 1e-3;
 
 /// What accuracy is asked for. The order of the elements is [`super::Part::order`].
 #[derive(Clone, Debug, PartialEq)]
@@ -22,6 +45,8 @@ pub struct Accuracy {
     pub max_contacts: usize,
     /// Whether the haptic loop solves whole steps.
     pub rates: Rates,
+    /// Where contact acts on the part.
+    pub contact_at: ContactAt,
     /// Whether the tool's corners and edges touch the part between its nodes.
     pub tool_features: ToolFeatures,
     /// Relative error of the resultant by sharing rows above which a step is counted and reported, > 0.
@@ -34,6 +59,58 @@ pub struct Accuracy {
     pub columns: Columns,
     /// Where the displacement multiply runs.
     pub multiply: Multiply,
+}
+
+/// Where contact acts on the part.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum ContactAt {
+    /// at the part's nodes: the force steps from one row of them to the next.
+    #[default]
+    Nodes,
+    /// where the tool is nearest to the edges and faces of the part: these places move with it.
+    Places,
+}
+
+/// Whether the tool's corners and sharp edges touch the part's faces between its nodes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ToolFeatures {
+    /// If the tool has some and the contact groups have faces.
+    #[default]
+    Auto,
+    /// Or else an error, which names this line of the scene.
+    On {
+        /// Line of the key.
+        line: usize,
+    },
+    /// Contact at the part's nodes only.
+    Off,
+}
+
+/// Number type in which the step reads the compliance.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Scalar {
+    /// 64 bits.
+    #[default]
+    F64,
+    /// 32 bits: half the memory to read, about seven digits.
+    F32,
+}
+
+/// Number type in which the displacement multiply keeps the compliance.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum MultiplyScalar {
+    /// 64 bits on the processor, 32 on a GPU.
+    #[default]
+    Auto,
+    /// 64 bits, on the processor.
+    F64,
+    /// 32 bits, about seven digits.
+    F32,
+    /// 16 bits on a GPU, about three digits; the processor keeps 32.
+    F16,
 }
 
 /// Which columns of the compliance are there from the start.
@@ -49,6 +126,19 @@ pub enum Columns {
     Near,
 }
 
+/// Where the displacement multiply runs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Multiply {
+    /// on the faster of processor and GPU.
+    #[default]
+    Auto,
+    /// on the processor.
+    Cpu,
+    /// on the best GPU, one in software too, or else an error.
+    Gpu,
+}
+
 impl Accuracy {
     /// Settings of a preset, or what a scene without one has.
     pub fn of(preset: Option<Preset>) -> Self {
@@ -58,10 +148,11 @@ impl Accuracy {
             adaptive: Adaptive::Off,
             contact_iterations: ContactIterations::Converged,
             near_distance: None,
-            max_contacts: raw::default::MAX_CONTACTS as usize,
+            max_contacts: MAX_CONTACTS as usize,
             rates: Rates::Auto,
+            contact_at: ContactAt::Nodes,
             tool_features: ToolFeatures::Auto,
-            merge_tolerance: raw::default::MERGE_TOLERANCE,
+            merge_tolerance: MERGE_TOLERANCE,
             scalar: MultiplyScalar::Auto,
             contact_scalar: Scalar::F64,
             columns: Columns::Auto,
@@ -80,9 +171,7 @@ impl Accuracy {
             Some(Preset::Exact) | None => plain,
         }
     }
-}
 
-impl Accuracy {
     /// The settings in a few words, for tables and reports.
     pub fn words(&self) -> String {
         let planes = match self.contact_iterations {
@@ -114,137 +203,229 @@ impl Accuracy {
     }
 }
 
-impl Adaptive {
-    /// In a few words, lengths in mm.
-    pub fn words(&self) -> String {
-        let Self::On(free) = self else {
-            return "all free".to_owned();
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct AccuracyKeys {
+    /// Settings for a goal; keys that are written beside it take precedence.
+    #[schemars(extend("x-default" = "none"))]
+    preset: Option<Preset>,
+    /// Time that 99.9 % of the steps may take, in microseconds whatever the units: the most
+    /// accurate settings that keep it on this machine are measured, chosen and named. Stands alone.
+    #[schemars(extend("x-type" = "number", "x-default" = "none"))]
+    budget_us: Option<At<f64>>,
+    /// Order of the elements, 1, 2 or 3; raised or lowered from the mesh's own.
+    #[schemars(extend("x-default" = "the mesh's own"))]
+    order: Option<Whole<1, 3>>,
+    /// The p-method: which interface nodes (those on edges and faces) are drawn where they are; the others follow
+    /// their principal nodes (the elements' vertices). Forces are those of the full order whatever is chosen.
+    /// `"off"`: all. A number: those within this radius of the contact. A table: `radius`, or `indicator` (where the
+    /// edge bends by more than this share of the largest displacement), or `budget_us` (as many as this time
+    /// allows, nearest first). Example: `{ radius = 3.0 }`.
+    #[schemars(extend("default" = "off"))]
+    adaptive: Option<At<AdaptiveKey>>,
+    /// How often contact planes are put on anew at the new positions within one step: until the
+    /// displacement no longer changes, or 1 to 50 times.
+    #[schemars(extend("default" = "converged"))]
+    contact_iterations: Option<At<IterationsKey>>,
+    /// Nodes nearer to the tool than this get a contact plane, above 0.
+    #[schemars(extend("x-default" = "chosen from the tool's motion"))]
+    near_distance: Option<Length>,
+    /// Rows of the contact problem of one step, 1 to 5000; its time grows with their cube. Where
+    /// more nodes are near, neighbours share a row, up to eight times as many; beyond that the
+    /// deepest are kept and the rest is counted and reported.
+    #[schemars(extend("default" = MAX_CONTACTS))]
+    max_contacts: Option<Whole<1, 5000>>,
+    /// Whether the haptic loop solves the whole step (`"one"`), or the engine runs beside it and hands
+    /// each step's contact problem over, which the loop solves again in every period: `{ every = 5 }`,
+    /// the results being there that many periods later, 1 to 50 and 50 ms at most (where the run waits
+    /// for the real clock: as soon as they are solved). `"auto"`: one; where the run waits for the
+    /// clock, two if 99 % of the steps of a rehearsal do not fit 0.7 of the period.
+    #[schemars(extend("default" = "auto"))]
+    rates: Option<RatesKey>,
+    /// Where contact acts on the part. Places take the steps out of the force of a tool with curved sides, and are dearer to
+    /// find; they need contact groups of faces.
+    #[schemars(extend("default" = "nodes"))]
+    contact_at: Option<ContactAt>,
+    /// Corners and sharp edges of the tool (a box, a cylinder of finite length, a mesh that bends by more than 20 degrees)
+    /// against the part's faces between its nodes: each point of them at a face is one more contact plane, of
+    /// `max_contacts` too. Without it contact acts at nodes only, and what comes between them is not seen. Edges
+    /// are sampled at half the part's smallest face. A step then takes some 0.1 ms on the shipped hook (docs/performance.md).
+    #[schemars(extend("default" = "auto"))]
+    tool_features: Option<At<ToolFeaturesWord>>,
+    /// Where nodes share rows, relative error of the resultant force above which steps are counted
+    /// and reported, above 0 to 1. It is estimated in each step by the gaps that are left.
+    #[schemars(extend("default" = MERGE_TOLERANCE))]
+    merge_tolerance: Option<Plain>,
+    /// Number type in which the displacement multiply keeps the compliance: it changes the drawn shape only, forces are
+    /// always computed in f64.
+    #[schemars(extend("default" = "auto"))]
+    scalar: Option<At<MultiplyScalar>>,
+    /// Number type in which the compliance between nodes that can touch is kept for the step; sums and solutions are
+    /// in f64. `"f32"` halves the memory and changes forces in the seventh digit.
+    #[schemars(extend("default" = "f64"))]
+    contact_scalar: Option<Scalar>,
+    /// Which columns of the compliance, one for each node that can touch, are computed beforehand; a node without
+    /// its column cannot be touched yet. `"near"` is for parts whose compliance does not fit into memory: the part is
+    /// factored at each start, and a node whose column came late is eased in. Not with `adaptive`.
+    #[schemars(extend("default" = "auto"))]
+    columns: Option<At<Columns>>,
+    /// Where the displacement multiply runs; forces do not depend on it. `"auto"` measures processor and GPU once for each
+    /// part, remembers the winner beside the prepared part, and says what it chose; a GPU that fails in a run is given up
+    /// for the processor. `"gpu"` is not for `scalar = "f64"` or `columns = "near"`.
+    #[schemars(extend("default" = "auto"))]
+    multiply: Option<Multiply>,
+}
+
+/// [`ToolFeatures`] as written: without the line, which only the check knows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+enum ToolFeaturesWord {
+    /// if the tool has some and the contact groups have faces.
+    Auto,
+    /// or else an error.
+    On,
+    /// contact at the part's nodes only.
+    Off,
+}
+
+impl AccuracyKeys {
+    /// Order of the elements: of `accuracy.order`, `part.order` or the preset.
+    pub(super) fn order(
+        &self,
+        of_part: Option<Whole<1, 3>>,
+        check: &Check<'_>,
+    ) -> Result<Option<u8>, SceneError> {
+        let read = |order| check.whole("order", order).map(|order| order as u8);
+        let own = self.order.map(read).transpose()?;
+        let of_part = of_part.map(read).transpose()?;
+        match (own, of_part, self.order) {
+            (Some(a), Some(p), Some(at)) if a != p => {
+                let what = format!("accuracy.order {a} and part.order {p} differ");
+                Err(check.error(at.offset, what, "leave one of the two out"))
+            }
+            (None, None, _) => Ok((self.preset == Some(Preset::Exact)).then_some(3)),
+            _ => Ok(own.or(of_part)),
+        }
+    }
+
+    /// `period`: of the servo, s.
+    pub(super) fn checked(&self, period: f64, check: &Check<'_>) -> Result<Accuracy, SceneError> {
+        self.refuse_mixed_budget(check)?;
+        let base = Accuracy::of(self.preset);
+        let budget_us = self.budget_us.map(|At { value, offset }| Plain {
+            value: In(value),
+            offset,
+        });
+        let near_distance = check.optional("near_distance", self.near_distance, Positive)?;
+        let max_contacts = match self.max_contacts {
+            Some(most) => check.whole("max_contacts", most)? as usize,
+            None => base.max_contacts,
         };
-        match free {
-            FreeNodes::Radius(0.0) => "none free".to_owned(),
-            FreeNodes::Radius(radius) => format!("free within {:.3} mm", 1e3 * radius),
-            FreeNodes::Indicator(share) => format!("free where bent by {} %", 100.0 * share),
-            FreeNodes::BudgetUs(budget) => format!("free as {budget} µs allow"),
+        let adaptive = match self.adaptive {
+            Some(adaptive) => adaptive.checked(check)?,
+            None => base.adaptive,
+        };
+        Ok(Accuracy {
+            preset: self.preset,
+            budget_us: check.optional("budget_us", budget_us, Positive)?,
+            rates: match self.rates {
+                Some(rates) => rates.checked(period, check)?,
+                None => base.rates,
+            },
+            adaptive,
+            contact_iterations: match self.contact_iterations {
+                Some(iterations) => iterations.checked(check)?,
+                None => base.contact_iterations,
+            },
+            near_distance,
+            max_contacts,
+            merge_tolerance: self.merge_tolerance(check)?,
+            contact_at: self.contact_at.unwrap_or_default(),
+            tool_features: self.tool_features(check),
+            scalar: self.scalar.map_or(base.scalar, |at| at.value),
+            contact_scalar: self.contact_scalar.unwrap_or(base.contact_scalar),
+            columns: self.columns(adaptive, check)?,
+            multiply: self.multiply(check)?,
+        })
+    }
+
+    /// A budget chooses settings itself, so others beside it would be ignored.
+    fn refuse_mixed_budget(&self, check: &Check<'_>) -> Result<(), SceneError> {
+        let Some(budget) = self.budget_us else {
+            return Ok(());
+        };
+        let beside = [
+            ("preset", self.preset.is_some()),
+            ("order", self.order.is_some()),
+            ("adaptive", self.adaptive.is_some()),
+            ("contact_iterations", self.contact_iterations.is_some()),
+            ("scalar", self.scalar.is_some()),
+        ];
+        match beside.into_iter().find(|(_, is_there)| *is_there) {
+            Some((key, _)) => Err(check.error(
+                budget.offset,
+                format!("budget_us chooses {key} itself, but {key} is written too"),
+                format!("leave out budget_us or {key}"),
+            )),
+            None => Ok(()),
         }
     }
-}
 
-/// Whether the haptic loop solves whole steps.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Rates {
-    /// Yes; in real time only if they fit the period, by measurement.
-    #[default]
-    Auto,
-    /// Yes.
-    One,
-    /// No: the engine runs beside it, and its results are there so many servo periods later, in
-    /// [1, 50]; in real time as soon as they are solved.
-    Every(u32),
-}
+    fn merge_tolerance(&self, check: &Check<'_>) -> Result<f64, SceneError> {
+        let Some(written) = self.merge_tolerance else {
+            return Ok(MERGE_TOLERANCE);
+        };
+        let value = check.number("merge_tolerance", written, Positive)?;
+        if value > 1.0 {
+            let what = format!("merge_tolerance {value} is more than all of the force");
+            let mend = "write a share from above 0 to 1";
+            return Err(check.error(written.offset, what, mend));
+        }
+        Ok(value)
+    }
 
-/// Whether the tool's corners and sharp edges touch the part's faces between its nodes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum ToolFeatures {
-    /// If the tool has some and the contact groups have faces.
-    #[default]
-    Auto,
-    /// Or else an error, which names this line of the scene.
-    On {
-        /// Line of the key.
-        line: usize,
-    },
-    /// Contact at the part's nodes only.
-    Off,
-}
-
-/// Bend of an edge, as a share of the largest displacement, that a picture of a thousand pixels
-/// begins to show.
-const SEEN_BEND: f64 = 1e-3;
-
-/// A goal that stands for all settings of accuracy.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Preset {
-    /// Two passes over the contact planes, shape drawn between the elements' vertices.
-    Fast,
-    /// Converged planes; interface nodes free where the part is seen to bend.
-    Balanced,
-    /// Order 3, all nodes free, tightest tolerance.
-    Exact,
-}
-
-impl Preset {
-    /// As in the file.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Fast => "fast",
-            Self::Balanced => "balanced",
-            Self::Exact => "exact",
+    fn tool_features(&self, check: &Check<'_>) -> ToolFeatures {
+        match self.tool_features {
+            None => ToolFeatures::default(),
+            Some(At { value, offset }) => match value {
+                ToolFeaturesWord::Auto => ToolFeatures::Auto,
+                ToolFeaturesWord::On => ToolFeatures::On {
+                    line: check.line(offset),
+                },
+                ToolFeaturesWord::Off => ToolFeatures::Off,
+            },
         }
     }
-}
 
-/// The p-method (Duriez et al. 2004, section 3.2).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Adaptive {
-    /// Every interface node is free.
-    #[default]
-    Off,
-    /// Some are; the others are interpolated for drawing. Forces are those of the full order.
-    On(FreeNodes),
-}
+    /// `adaptive`: the key's or the preset's.
+    fn columns(&self, adaptive: Adaptive, check: &Check<'_>) -> Result<Columns, SceneError> {
+        let Some(At { value, offset }) = self.columns else {
+            return Ok(Columns::default());
+        };
+        if value == Columns::Near && adaptive != Adaptive::Off {
+            let what = "columns \"near\" and adaptive do not go together";
+            let mend = "leave columns out, or write adaptive = \"off\"";
+            return Err(check.error(offset, what, mend));
+        }
+        Ok(value)
+    }
 
-/// Which interface nodes are free.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum FreeNodes {
-    /// Within this distance of a contact, m, >= 0.
-    Radius(f64),
-    /// Where the edge bends by more than this share of the largest displacement, > 0.
-    Indicator(f64),
-    /// As many as a step of this many µs allows, nearest to the contact first, > 0.
-    BudgetUs(f64),
-}
-
-/// How often contact planes are put on anew within a step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ContactIterations {
-    /// Until the displacement no longer changes.
-    Converged,
-    /// This often, 1 to 50.
-    Times(u32),
-}
-
-/// Number type in which the step reads the compliance.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Scalar {
-    /// 64-bit.
-    #[default]
-    F64,
-    /// 32-bit.
-    F32,
-}
-
-/// Number type in which the displacement multiply keeps the compliance.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum MultiplyScalar {
-    /// 64-bit on the processor, 32-bit on a GPU.
-    #[default]
-    Auto,
-    /// 64-bit: the processor only.
-    F64,
-    /// 32-bit.
-    F32,
-    /// 16-bit on a GPU, 32-bit on the processor.
-    F16,
-}
-
-/// Where the displacement multiply runs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Multiply {
-    /// On the faster of processor and GPU.
-    #[default]
-    Auto,
-    /// On the processor.
-    Cpu,
-    /// On a GPU, or not at all. Not with 64-bit numbers or fetched columns.
-    Gpu,
+    fn multiply(&self, check: &Check<'_>) -> Result<Multiply, SceneError> {
+        let multiply = self.multiply.unwrap_or_default();
+        if multiply != Multiply::Gpu {
+            return Ok(multiply);
+        }
+        if let Some(scalar) = self.scalar.filter(|at| at.value == MultiplyScalar::F64) {
+            let what =
+                "scalar \"f64\" does not go with multiply \"gpu\", which keeps 32 or 16 bits";
+            let mend =
+                "write scalar = \"f32\" or \"f16\" or leave it out, or write multiply = \"cpu\"";
+            return Err(check.error(scalar.offset, what, mend));
+        }
+        if let Some(columns) = self.columns.filter(|at| at.value == Columns::Near) {
+            let what = "columns \"near\" does not go with multiply \"gpu\", which needs the whole compliance";
+            return Err(check.error(columns.offset, what, "leave one of the two out"));
+        }
+        Ok(multiply)
+    }
 }

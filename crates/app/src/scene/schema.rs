@@ -6,7 +6,8 @@ use schemars::generate::SchemaSettings;
 use serde::de::{self, Deserialize, Deserializer, Visitor};
 use serde_json::Value;
 
-use super::{raw, units};
+use super::{SceneKeys, accuracy, units};
+use super::{coupling, device, drive, effects, hand, handbook, holds, limits, output, part, tool};
 
 /// A short whole scene, as the document shows it.
 const EXAMPLE: &str = r#"title = "Clip on a 20 mm tube"
@@ -83,7 +84,7 @@ pub fn markdown() -> String {
     out.push_str(
         "```\n\nThe scenes in `scenes/` are whole ones to start from.\n\n## Top level\n\n",
     );
-    let names = field_names::<raw::SceneRaw>();
+    let names = field_names::<SceneKeys>();
     let is_section = |name: &str| match &schema["properties"][name]["type"] {
         // Either a section or one word for it.
         Value::Array(types) => types.iter().any(|name| name == "object"),
@@ -113,7 +114,11 @@ pub fn markdown() -> String {
         if *name == "part" {
             let material = &section["properties"]["material"];
             let _ = write!(out, "\n## [part.material]\n\n{}\n\n", description(material));
-            table(&mut out, material, field_names::<raw::MaterialRaw>().iter());
+            table(
+                &mut out,
+                material,
+                field_names::<part::MaterialKeys>().iter(),
+            );
         }
     }
     out
@@ -122,18 +127,18 @@ pub fn markdown() -> String {
 /// Keys of a section in the order of the code; the schema itself has them by name.
 fn section_keys(section: &str) -> &'static [&'static str] {
     match section {
-        "part" => field_names::<raw::PartRaw>(),
-        "tool" => field_names::<raw::ToolRaw>(),
-        "holds" => field_names::<raw::HoldsRaw>(),
-        "drive" => field_names::<raw::DriveRaw>(),
-        "limits" => field_names::<raw::LimitsRaw>(),
-        "hand" => field_names::<raw::HandRaw>(),
-        "coupling" => field_names::<raw::CouplingRaw>(),
-        "device" => field_names::<raw::DeviceRaw>(),
-        "accuracy" => field_names::<raw::AccuracyKeys>(),
-        "effects" => field_names::<raw::EffectsRaw>(),
-        "output" => field_names::<raw::OutputRaw>(),
-        "handbook" => field_names::<raw::HandbookRaw>(),
+        "part" => field_names::<part::PartKeys>(),
+        "tool" => field_names::<tool::ToolKeys>(),
+        "holds" => field_names::<holds::HoldsKeys>(),
+        "drive" => field_names::<drive::DriveKeys>(),
+        "limits" => field_names::<limits::LimitsKeys>(),
+        "hand" => field_names::<hand::HandKeys>(),
+        "coupling" => field_names::<coupling::CouplingKeys>(),
+        "device" => field_names::<device::DeviceKeys>(),
+        "accuracy" => field_names::<accuracy::AccuracyKeys>(),
+        "effects" => field_names::<effects::EffectsKeys>(),
+        "output" => field_names::<output::OutputKeys>(),
+        "handbook" => field_names::<handbook::HandbookKeys>(),
         _ => &[],
     }
 }
@@ -142,7 +147,7 @@ fn schema() -> Value {
     let settings = SchemaSettings::draft07().with(|settings| settings.inline_subschemas = true);
     let mut schema = settings
         .into_generator()
-        .into_root_schema_for::<raw::SceneRaw>()
+        .into_root_schema_for::<SceneKeys>()
         .to_value();
     without_null(&mut schema);
     unfold(&mut schema);
@@ -393,7 +398,7 @@ mod tests {
         );
         assert_eq!(
             value["properties"]["hand"]["properties"]["mass"]["default"],
-            raw::default::HAND_MASS
+            hand::MASS
         );
     }
 }

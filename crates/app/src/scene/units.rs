@@ -1,8 +1,21 @@
-//! Factors from the scene file's units to SI.
+//! What the numbers of a scene file measure, and the factors from its units to SI.
 
-use super::Units;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-/// What a number of the scene file measures.
+/// Units of the scene file and of its mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum Units {
+    /// m, N, s, Pa, kg.
+    #[default]
+    #[serde(rename = "SI")]
+    Si,
+    /// mm, N, s, MPa, t (tonne).
+    #[serde(rename = "mm-N-MPa")]
+    MmNMpa,
+}
+
+/// What a number of the scene file measures, in the order of the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Quantity {
     Length,
@@ -25,7 +38,7 @@ use Quantity::*;
 
 /// Names as the schema writes them, units in SI, units in mm-N-MPa, factor from the latter.
 /// mm-N-MPa is the consistent set that mesh programs use: with mm, N and s the mass is in t.
-const TABLE: [(Quantity, &str, &str, &str, f64); 14] = [
+pub(super) const TABLE: [(Quantity, &str, &str, &str, f64); 14] = [
     (Length, "length", "m", "mm", 1e-3),
     (Time, "time", "s", "s", 1.0),
     (Speed, "speed", "m/s", "mm/s", 1e-3),
@@ -64,20 +77,17 @@ const TABLE: [(Quantity, &str, &str, &str, f64); 14] = [
 pub(super) fn to_si(units: Units, quantity: Quantity) -> f64 {
     match units {
         Units::Si => 1.0,
-        Units::MmNMpa => TABLE
-            .iter()
-            .find(|row| row.0 == quantity)
-            .map_or(1.0, |row| row.4),
+        Units::MmNMpa => TABLE[quantity as usize].4,
     }
 }
 
 /// Unit of a quantity in the file.
 pub(super) fn label(units: Units, quantity: Quantity) -> &'static str {
-    let row = TABLE.iter().find(|row| row.0 == quantity);
-    row.map_or("", |row| match units {
+    let row = &TABLE[quantity as usize];
+    match units {
         Units::Si => row.2,
         Units::MmNMpa => row.3,
-    })
+    }
 }
 
 /// Units of a quantity by its name in the schema: SI, mm-N-MPa.
@@ -91,6 +101,11 @@ pub(super) fn labels(name: &str) -> Option<(&'static str, &'static str)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rows_are_in_the_order_of_the_quantities() {
+        assert!((0..).zip(TABLE).all(|(row, of)| row == of.0 as usize));
+    }
 
     /// Each factor follows from mm, t, s alone: F = m a, so 1 N = 1 t mm/s² and MPa = N/mm².
     #[test]

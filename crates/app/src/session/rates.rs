@@ -99,10 +99,6 @@ pub(super) fn choose(spec: &SessionSpec, engine: &mut Engine) -> ChosenRates {
         Rates::One => (None, "asked for".to_owned()),
         Rates::Every(n) => (Some(u64::from(n)), "asked for".to_owned()),
         Rates::Auto if !spec.real_time => (None, "no real clock to keep up with".to_owned()),
-        Rates::Auto if engine.has_edges() => (
-            None,
-            "a tool whose corners and edges touch has one rate only".to_owned(),
-        ),
         Rates::Auto => rehearse(spec, engine),
     };
     ChosenRates {

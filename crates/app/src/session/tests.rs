@@ -9,7 +9,7 @@ use super::fast::FastLoop;
 use super::handover::Handed;
 use super::slow::solve_and_freeze;
 use super::*;
-use crate::engine::{ContactIterations, ContactPart, EngineSettings};
+use crate::engine::{ContactIterations, ContactPart, EngineSettings, Plan};
 
 const N_PERIODS: u64 = 400;
 
@@ -28,7 +28,7 @@ fn engine() -> Engine {
     };
     let tool = Tool::Sphere(Sphere::new(5e-3).unwrap());
     let coupling = VirtualCoupling::new(1e4, 10.0).unwrap();
-    Engine::new(Arc::new(part), tool, Some(coupling), settings).unwrap()
+    Engine::new(Plan::new(Arc::new(part), tool, Some(coupling), settings)).unwrap()
 }
 
 pub(super) fn spec() -> SessionSpec {

@@ -89,16 +89,18 @@ fn main() {
 fn table(text: &mut String, rows: &[Row]) {
     text.push_str(
         "| m | active | Cholesky, all rows | Cholesky, active | **cold** | ratio | rounds | \
-         rows moved | **warm** | ratio | active set (pivots) | Lemke (pivots) | Gauss-Seidel (sweeps) | Clarabel | certificate |\n",
+         rows moved | **warm** | ratio | active set (pivots) | Gauss-Seidel (sweeps) | Clarabel | certificate |\n",
     );
-    text.push_str("| --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: |\n");
+    text.push_str(
+        "| --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: |\n",
+    );
     for row in rows {
         let counted = |x: Option<(f64, usize)>| {
             x.map_or("".to_owned(), |(time, n)| format!("{} ({n})", short(time)))
         };
         writeln!(
             text,
-            "| {} | {} | {} | {} | **{}** | {:.2} | {} | {} | **{}** | {:.2} | {} ({}) | {} | {} | {} | {:.0e} |",
+            "| {} | {} | {} | {} | **{}** | {:.2} | {} | {} | **{}** | {:.2} | {} ({}) | {} | {} | {:.0e} |",
             row.m,
             row.n_active,
             short(row.all_rows),
@@ -111,7 +113,6 @@ fn table(text: &mut String, rows: &[Row]) {
             row.warm / row.all_rows,
             short(row.active_set),
             row.active_set_pivots,
-            counted(row.lemke),
             counted(row.gauss_seidel),
             row.clarabel.map_or(String::new(), short),
             row.cold_solution.certificate.natural_residual,

@@ -5,7 +5,7 @@ use std::time::Instant;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, NonnegativeConeT};
 use contact::lcp::{
-    ActiveSet, Automatic, GaussSeidel, Lemke, Problem, Scratch, Settings, Solution, Solver, Start,
+    ActiveSet, Automatic, GaussSeidel, Problem, Scratch, Settings, Solution, Solver, Start,
 };
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
@@ -26,7 +26,6 @@ pub(crate) struct Row {
     pub(crate) warm: f64,
     pub(crate) active_set: f64,
     pub(crate) active_set_pivots: usize,
-    pub(crate) lemke: Option<(f64, usize)>,
     pub(crate) gauss_seidel: Option<(f64, usize)>,
     pub(crate) clarabel: Option<f64>,
 }
@@ -41,13 +40,13 @@ pub(crate) fn row(matrix: &[f64], q: &[f64]) -> Row {
     };
     let mut scratch = Scratch::new(m);
     let (mut z, mut w) = (vec![0.0; m], vec![0.0; m]);
-    let mut run = |solver: &dyn Solver<f64>, start: Start, z: &mut [f64]| -> Solution {
+    let mut run = |solver: &dyn Solver, start: Start, z: &mut [f64]| -> Solution {
         // The check of the data is part of the time.
         let problem = Problem::trusted_symmetric(matrix, q).unwrap();
         let solution = solver.solve(&problem, &settings, &mut scratch, start, z, &mut w);
         solution.unwrap()
     };
-    let mut timed = |solver: &dyn Solver<f64>, start: Start| {
+    let mut timed = |solver: &dyn Solver, start: Start| {
         let solution = run(solver, start, &mut z);
         let time = median_us(|| {
             run(solver, start, &mut z);
@@ -58,7 +57,6 @@ pub(crate) fn row(matrix: &[f64], q: &[f64]) -> Row {
     let is_active: Vec<bool> = forces.iter().map(|z| *z > 0.0).collect();
     let (warm, ..) = timed(&Automatic, Start::Rows(&is_active));
     let (active_set, by_pivots, _) = timed(&ActiveSet, Start::Cold);
-    let lemke = (m < SLOW).then(|| timed(&Lemke, Start::Cold));
     let gauss_seidel = (m < SLOW).then(|| timed(&GaussSeidel, Start::Cold));
     let active: Vec<usize> = (0..m).filter(|i| is_active[*i]).collect();
     let all: Vec<usize> = (0..m).collect();
@@ -72,7 +70,6 @@ pub(crate) fn row(matrix: &[f64], q: &[f64]) -> Row {
         warm,
         active_set,
         active_set_pivots: by_pivots.pivots,
-        lemke: lemke.map(|(time, solution, _)| (time, solution.pivots)),
         gauss_seidel: gauss_seidel.map(|(time, solution, _)| (time, solution.sweeps)),
         clarabel: (m < SLOW).then(|| clarabel_us(matrix, q)),
     }

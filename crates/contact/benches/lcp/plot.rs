@@ -22,7 +22,7 @@ pub(crate) fn times(rows: &[Row], sequences: &[SequenceRow]) -> String {
         let rough = sequences.iter().filter(|row| row.name == "rough");
         rough.map(|row| (row.m as f64, value(row))).collect()
     };
-    let lines: [Line; 8] = [
+    let lines: [Line; 7] = [
         (
             "Clarabel (QP crate)",
             RGBColor(130, 130, 130),
@@ -32,11 +32,6 @@ pub(crate) fn times(rows: &[Row], sequences: &[SequenceRow]) -> String {
             "Gauss-Seidel to 1e-10",
             RGBColor(204, 121, 167),
             of(&|r| r.gauss_seidel.map(|x| x.0)),
-        ),
-        (
-            "Lemke",
-            RGBColor(230, 159, 0),
-            of(&|r| r.lemke.map(|x| x.0)),
         ),
         (
             "active set, single pivots",

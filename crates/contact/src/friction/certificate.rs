@@ -2,7 +2,6 @@
 
 use super::{Problem, cone};
 use crate::error::Error;
-use crate::lcp::Scalar;
 
 /// How well an answer fits the problem as given. For a solution all numbers but the gaps are 0 or round-off.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -20,11 +19,11 @@ pub struct Certificate {
     pub max_friction_work: f64,
 }
 
-/// The certificate of `forces`, made from nothing but the data: for checking any solver. Sums in f64.
+/// The certificate of `forces`, made from nothing but the data: for checking any solver.
 ///
 /// # Errors
 /// [`Error::Length`] unless there are three forces per contact.
-pub fn check<T: Scalar>(problem: &Problem<T>, forces: &[T]) -> Result<Certificate, Error> {
+pub fn check(problem: &Problem, forces: &[f64]) -> Result<Certificate, Error> {
     problem.check_length("the forces", forces.len())?;
     let n_rows = problem.q().len();
     let mut judge = Judge::new(problem, forces);
@@ -32,22 +31,21 @@ pub fn check<T: Scalar>(problem: &Problem<T>, forces: &[T]) -> Result<Certificat
         let row = 3 * contact;
         let mut u = [0.0; 3];
         for (axis, u) in u.iter_mut().enumerate() {
-            let products =
-                (0..n_rows).map(|j| problem.column(j)[row + axis].wide() * forces[j].wide());
-            *u = problem.q()[row + axis].wide() + products.sum::<f64>();
+            let products = (0..n_rows).map(|j| problem.column(j)[row + axis] * forces[j]);
+            *u = problem.q()[row + axis] + products.sum::<f64>();
         }
-        let force = [forces[row], forces[row + 1], forces[row + 2]].map(|f| f.wide());
-        judge.contact(problem.friction_coefficients()[contact].wide(), force, u);
+        let force = [forces[row], forces[row + 1], forces[row + 2]];
+        judge.contact(problem.friction_coefficients()[contact], force, u);
     }
     Ok(judge.certificate)
 }
 
 /// As [`check`] where u = q + W λ is already there.
-pub(super) fn of<T: Scalar>(problem: &Problem<T>, forces: &[T], u: &[T]) -> Certificate {
+pub(super) fn of(problem: &Problem, forces: &[f64], u: &[f64]) -> Certificate {
     let mut judge = Judge::new(problem, forces);
     let triples = forces.as_chunks::<3>().0.iter().zip(u.as_chunks::<3>().0);
     for ((force, u), mu) in triples.zip(problem.friction_coefficients()) {
-        judge.contact(mu.wide(), force.map(|f| f.wide()), u.map(|u| u.wide()));
+        judge.contact(*mu, *force, *u);
     }
     judge.certificate
 }
@@ -59,11 +57,9 @@ struct Judge {
 }
 
 impl Judge {
-    fn new<T: Scalar>(problem: &Problem<T>, forces: &[T]) -> Self {
-        let per_size = |values: &[T]| {
-            let max = values
-                .iter()
-                .fold(0.0, |max: f64, x| max.max(x.wide().abs()));
+    fn new(problem: &Problem, forces: &[f64]) -> Self {
+        let per_size = |values: &[f64]| {
+            let max = values.iter().fold(0.0, |max: f64, x| max.max(x.abs()));
             if max > 0.0 {
                 1.0 / max.max(f64::MIN_POSITIVE)
             } else {

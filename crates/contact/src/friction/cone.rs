@@ -1,14 +1,12 @@
 //! The friction cone K = { λ : |λ_t| ≤ μ λ_n } and the nearest point of it.
 
-use crate::lcp::Scalar;
-
 /// Length of the tangential part.
-pub(super) fn tangential<T: Scalar>(v: &[T; 3]) -> T {
+pub(super) fn tangential(v: &[f64; 3]) -> f64 {
     v[1].hypot(v[2])
 }
 
 /// The point of the cone nearest to `v`.
-pub(super) fn project<T: Scalar>(v: &[T; 3], friction_coefficient: T) -> [T; 3] {
+pub(super) fn project(v: &[f64; 3], friction_coefficient: f64) -> [f64; 3] {
     let mu = friction_coefficient;
     let t = tangential(v);
     if t <= mu * v[0] {
@@ -16,15 +14,11 @@ pub(super) fn project<T: Scalar>(v: &[T; 3], friction_coefficient: T) -> [T; 3] 
     }
     // Behind the polar cone all is nearest to the tip.
     if mu * t <= -v[0] {
-        return [T::zero(); 3];
+        return [0.0; 3];
     }
-    let normal = (v[0] + mu * t) / (T::one() + mu * mu);
-    if t <= T::zero() {
-        return [
-            num_traits::Float::max(normal, T::zero()),
-            T::zero(),
-            T::zero(),
-        ];
+    let normal = (v[0] + mu * t) / (1.0 + mu * mu);
+    if t <= 0.0 {
+        return [normal.max(0.0), 0.0, 0.0];
     }
     let scale = mu * normal / t;
     [normal, scale * v[1], scale * v[2]]

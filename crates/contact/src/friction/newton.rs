@@ -9,28 +9,27 @@ use faer::linalg::lu::partial_pivoting as lu;
 use faer::{MatMut, MatRef, Par, Spec};
 
 use super::{Problem, State};
-use crate::lcp::Scalar;
 
 /// Memory for up to `capacity` rows.
 #[derive(Debug, Clone)]
-pub(super) struct Scratch<T> {
+pub(super) struct Scratch {
     rows: Vec<u32>,
-    jacobian: Vec<T>,
-    right: Vec<T>,
+    jacobian: Vec<f64>,
+    right: Vec<f64>,
     permutation: Vec<u32>,
     inverse: Vec<u32>,
     stack: Vec<MaybeUninit<u8>>,
 }
 
-impl<T: Scalar> Scratch<T> {
+impl Scratch {
     pub(super) fn new(capacity: usize) -> Self {
         let n = capacity;
-        let factor = lu::factor::lu_in_place_scratch::<u32, T>(n, n, Par::Seq, Spec::default());
-        let solve = lu::solve::solve_in_place_scratch::<u32, T>(n, 1, Par::Seq);
+        let factor = lu::factor::lu_in_place_scratch::<u32, f64>(n, n, Par::Seq, Spec::default());
+        let solve = lu::solve::solve_in_place_scratch::<u32, f64>(n, 1, Par::Seq);
         Self {
             rows: Vec::with_capacity(n),
-            jacobian: vec![T::zero(); n * n],
-            right: vec![T::zero(); n],
+            jacobian: vec![0.0; n * n],
+            right: vec![0.0; n],
             permutation: vec![0; n],
             inverse: vec![0; n],
             stack: vec![MaybeUninit::uninit(); factor.or(solve).unaligned_bytes_required()],
@@ -43,10 +42,10 @@ impl<T: Scalar> Scratch<T> {
     /// False if there is nothing to solve or the system is singular; `forces` are as before then.
     pub(super) fn step(
         &mut self,
-        problem: &Problem<T>,
+        problem: &Problem,
         states: &[State],
-        u: &[T],
-        forces: &mut [T],
+        u: &[f64],
+        forces: &mut [f64],
     ) -> bool {
         self.rows.clear();
         for (contact, state) in states.iter().enumerate() {
@@ -74,7 +73,7 @@ impl<T: Scalar> Scratch<T> {
         let right = MatMut::from_column_major_slice_mut(&mut self.right[..n], n, 1);
         lu::solve::solve_in_place(factor, factor, permutation, right, Par::Seq, stack);
         let right = &self.right[..n];
-        if !right.iter().all(|x| num_traits::Float::is_finite(*x)) {
+        if !right.iter().all(|x| x.is_finite()) {
             return false;
         }
         for (&row, &step) in self.rows.iter().zip(right) {
@@ -84,7 +83,7 @@ impl<T: Scalar> Scratch<T> {
     }
 
     /// The rows of the linearised conditions, each by its own size, and minus their values.
-    fn assemble(&mut self, problem: &Problem<T>, states: &[State], u: &[T], forces: &[T]) {
+    fn assemble(&mut self, problem: &Problem, states: &[State], u: &[f64], forces: &[f64]) {
         let n = self.rows.len();
         for (column, &j) in self.rows.iter().enumerate() {
             let source = problem.column(j as usize);
@@ -111,15 +110,15 @@ impl<T: Scalar> Scratch<T> {
     /// ```text
     /// δλ_t - μ e δλ_n - (μ λ_n / |s|) (I - e eᵀ) (δλ_t - ρ W_t δλ) = μ λ_n e - λ_t,   e = s / |s|
     /// ```
-    fn slip_rows(&mut self, position: usize, mu: T, u: &[T; 3], force: &[T; 3]) {
+    fn slip_rows(&mut self, position: usize, mu: f64, u: &[f64; 3], force: &[f64; 3]) {
         let n = self.rows.len();
         let at = |row: usize, column: usize| (position + column) * n + position + row;
         // ρ of the size of a stiffness, so that force and slip weigh alike; the rows are scaled back to compliances.
-        let compliance = T::of(0.5) * (self.jacobian[at(1, 1)] + self.jacobian[at(2, 2)]);
-        let rho = T::one() / compliance;
+        let compliance = 0.5 * (self.jacobian[at(1, 1)] + self.jacobian[at(2, 2)]);
+        let rho = 1.0 / compliance;
         let s = [force[1] - rho * u[1], force[2] - rho * u[2]];
         let length = s[0].hypot(s[1]);
-        if length.is_nan() || length <= T::zero() {
+        if length.is_nan() || length <= 0.0 {
             return;
         }
         let e = [s[0] / length, s[1] / length];
@@ -132,7 +131,7 @@ impl<T: Scalar> Scratch<T> {
                 if column == position + axis {
                     compliance
                 } else {
-                    T::zero()
+                    0.0
                 }
             };
             let moved = [unit(1) - w[0], unit(2) - w[1]];
@@ -149,6 +148,6 @@ impl<T: Scalar> Scratch<T> {
     }
 }
 
-fn triple<T: Copy>(values: &[T], row: usize) -> [T; 3] {
+fn triple(values: &[f64], row: usize) -> [f64; 3] {
     [values[row], values[row + 1], values[row + 2]]
 }

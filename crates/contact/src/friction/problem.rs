@@ -1,23 +1,27 @@
 //! The data of a frictional contact problem, checked once.
 
 use crate::error::Error;
-use crate::lcp::{self, Scalar};
+use crate::lcp;
 
 /// A frictional contact problem of n contacts, borrowed: column-major `matrix` W (3n x 3n, m/N), `q` (3n, m) and
 /// one friction coefficient per contact. Rows of contact i: 3i normal, 3i + 1 and 3i + 2 tangents.
 #[derive(Debug, Clone, Copy)]
-pub struct Problem<'a, T = f64> {
-    rows: lcp::Problem<'a, T>,
-    friction_coefficients: &'a [T],
+pub struct Problem<'a> {
+    rows: lcp::Problem<'a>,
+    friction_coefficients: &'a [f64],
 }
 
-impl<'a, T: Scalar> Problem<'a, T> {
+impl<'a> Problem<'a> {
     /// Checks the data. Does not allocate.
     ///
     /// # Errors
     /// [`Error::Length`] unless W is square of the size of q and three times that of the coefficients;
     /// [`Error::NotFinite`]; [`Error::NotSymmetric`]; [`Error::NegativeFriction`].
-    pub fn new(matrix: &'a [T], q: &'a [T], friction_coefficients: &'a [T]) -> Result<Self, Error> {
+    pub fn new(
+        matrix: &'a [f64],
+        q: &'a [f64],
+        friction_coefficients: &'a [f64],
+    ) -> Result<Self, Error> {
         Self::check_coefficients(q, friction_coefficients)?;
         Ok(Self {
             rows: lcp::Problem::symmetric(matrix, q)?,
@@ -30,9 +34,9 @@ impl<'a, T: Scalar> Problem<'a, T> {
     /// # Errors
     /// As [`Problem::new`].
     pub fn trusted_symmetric(
-        matrix: &'a [T],
-        q: &'a [T],
-        friction_coefficients: &'a [T],
+        matrix: &'a [f64],
+        q: &'a [f64],
+        friction_coefficients: &'a [f64],
     ) -> Result<Self, Error> {
         Self::check_coefficients(q, friction_coefficients)?;
         Ok(Self {
@@ -41,7 +45,7 @@ impl<'a, T: Scalar> Problem<'a, T> {
         })
     }
 
-    fn check_coefficients(q: &[T], coefficients: &[T]) -> Result<(), Error> {
+    fn check_coefficients(q: &[f64], coefficients: &[f64]) -> Result<(), Error> {
         if q.len() != 3 * coefficients.len() {
             return Err(Error::Length {
                 what: "q of the frictional contact problem",
@@ -50,10 +54,10 @@ impl<'a, T: Scalar> Problem<'a, T> {
             });
         }
         for (contact, coefficient) in coefficients.iter().enumerate() {
-            if !num_traits::Float::is_finite(*coefficient) || *coefficient < T::zero() {
+            if !coefficient.is_finite() || *coefficient < 0.0 {
                 return Err(Error::NegativeFriction {
                     contact,
-                    value: coefficient.wide(),
+                    value: *coefficient,
                 });
             }
         }
@@ -66,25 +70,25 @@ impl<'a, T: Scalar> Problem<'a, T> {
     }
 
     /// W, column-major.
-    pub fn matrix(&self) -> &'a [T] {
+    pub fn matrix(&self) -> &'a [f64] {
         self.rows.matrix()
     }
 
     /// Gaps and slips without contact force, m.
-    pub fn q(&self) -> &'a [T] {
+    pub fn q(&self) -> &'a [f64] {
         self.rows.q()
     }
 
     /// μ of each contact.
-    pub fn friction_coefficients(&self) -> &'a [T] {
+    pub fn friction_coefficients(&self) -> &'a [f64] {
         self.friction_coefficients
     }
 
-    pub(super) fn rows(&self) -> &lcp::Problem<'a, T> {
+    pub(super) fn rows(&self) -> &lcp::Problem<'a> {
         &self.rows
     }
 
-    pub(super) fn column(&self, j: usize) -> &'a [T] {
+    pub(super) fn column(&self, j: usize) -> &'a [f64] {
         let n = self.q().len();
         &self.matrix()[j * n..(j + 1) * n]
     }

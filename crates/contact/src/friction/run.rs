@@ -5,18 +5,18 @@ use std::time::Instant;
 use super::local::Local;
 use super::{Certificate, Problem, Scratch, Settings, Solution, State, Status, certificate, cone};
 use crate::error::Error;
-use crate::lcp::{self, Scalar};
+use crate::lcp;
 
 /// Sweeps between two tries of Newton's method. The first few find out who sticks.
 const SWEEPS_PER_TRY: usize = 5;
 
-pub(crate) fn run<T: Scalar>(
-    problem: &Problem<T>,
+pub(super) fn run(
+    problem: &Problem,
     settings: &Settings,
-    scratch: &mut Scratch<T>,
+    scratch: &mut Scratch,
     is_warm: bool,
-    forces: &mut [T],
-    slip: &mut [T],
+    forces: &mut [f64],
+    slip: &mut [f64],
 ) -> Result<Solution, Error> {
     let n = problem.n_contacts();
     if n > scratch.capacity {
@@ -27,8 +27,7 @@ pub(crate) fn run<T: Scalar>(
     }
     problem.check_length("the forces", forces.len())?;
     problem.check_length("the slips", slip.len())?;
-    let is_finite = |x: &T| num_traits::Float::is_finite(*x);
-    if is_warm && let Some(index) = forces.iter().position(|x| !is_finite(x)) {
+    if is_warm && let Some(index) = forces.iter().position(|x| !x.is_finite()) {
         return Err(Error::NotFinite {
             what: "force to start from",
             index,
@@ -37,7 +36,7 @@ pub(crate) fn run<T: Scalar>(
     scratch.states.clear();
     scratch.states.resize(n, State::Open);
     scratch.directions.clear();
-    scratch.directions.resize(n, [T::zero(); 2]);
+    scratch.directions.resize(n, [0.0; 2]);
     let mut run = Run {
         problem,
         settings,
@@ -46,10 +45,7 @@ pub(crate) fn run<T: Scalar>(
         sweeps: 0,
         newton_steps: 0,
     };
-    let has_friction = problem
-        .friction_coefficients()
-        .iter()
-        .any(|mu| *mu > T::zero());
+    let has_friction = problem.friction_coefficients().iter().any(|mu| *mu > 0.0);
     if !is_warm || !has_friction {
         run.start_without_friction(scratch)?;
     } else {
@@ -83,19 +79,19 @@ pub(crate) fn run<T: Scalar>(
     })
 }
 
-struct Run<'a, T> {
-    problem: &'a Problem<'a, T>,
+struct Run<'a> {
+    problem: &'a Problem<'a>,
     settings: &'a Settings,
-    forces: &'a mut [T],
+    forces: &'a mut [f64],
     /// q + W λ.
-    u: &'a mut [T],
+    u: &'a mut [f64],
     sweeps: usize,
     newton_steps: usize,
 }
 
-impl<T: Scalar> Run<'_, T> {
+impl Run<'_> {
     /// Normal forces from the complementarity problem of the normal rows, no tangential ones.
-    fn start_without_friction(&mut self, scratch: &mut Scratch<T>) -> Result<(), Error> {
+    fn start_without_friction(&mut self, scratch: &mut Scratch) -> Result<(), Error> {
         let problem = self.problem;
         let n = problem.n_contacts();
         let matrix = &mut scratch.normal_matrix[..n * n];
@@ -114,26 +110,26 @@ impl<T: Scalar> Run<'_, T> {
             &lcp::Problem::trusted_symmetric(matrix, q)?,
             &lcp::Settings {
                 deadline: self.settings.deadline,
-                ..lcp::Settings::of::<T>()
+                ..lcp::Settings::default()
             },
             &mut scratch.lcp,
             lcp::Start::Cold,
             z,
             &mut scratch.normal_gap[..n],
         )?;
-        self.forces.fill(T::zero());
+        self.forces.fill(0.0);
         for (force, z) in self.forces.iter_mut().step_by(3).zip(z) {
             *force = *z;
         }
         Ok(())
     }
 
-    fn solve(&mut self, scratch: &mut Scratch<T>) -> Certificate {
+    fn solve(&mut self, scratch: &mut Scratch) -> Certificate {
         let mut best = certificate::of(self.problem, self.forces, self.u);
         let n_rows = self.forces.len();
         scratch.best[..n_rows].copy_from_slice(self.forces);
         while self.sweeps < self.settings.max_sweeps
-            && best.natural_residual > T::GOAL
+            && best.natural_residual > lcp::GOAL
             && !self.is_over()
         {
             for _ in 0..SWEEPS_PER_TRY.min(self.settings.max_sweeps - self.sweeps) {
@@ -167,7 +163,7 @@ impl<T: Scalar> Run<'_, T> {
     }
 
     /// Every contact once, the others standing still.
-    fn sweep(&mut self, scratch: &mut Scratch<T>) {
+    fn sweep(&mut self, scratch: &mut Scratch) {
         let problem = self.problem;
         for contact in 0..problem.n_contacts() {
             let first = 3 * contact;
@@ -177,7 +173,7 @@ impl<T: Scalar> Run<'_, T> {
             let b = [0, 1, 2].map(|row: usize| {
                 self.u[first + row] - w[row][0] * old[0] - w[row][1] * old[1] - w[row][2] * old[2]
             });
-            if w[0][0] <= T::zero() {
+            if w[0][0] <= 0.0 {
                 // A point that no force moves never carries any.
                 continue;
             }
@@ -191,7 +187,7 @@ impl<T: Scalar> Run<'_, T> {
             scratch.directions[contact] = answer.direction;
             for axis in 0..3 {
                 let change = answer.force[axis] - old[axis];
-                if change != T::zero() {
+                if change != 0.0 {
                     self.forces[first + axis] = answer.force[axis];
                     for (u, &w) in self.u.iter_mut().zip(columns[axis]) {
                         *u += change * w;
@@ -203,20 +199,20 @@ impl<T: Scalar> Run<'_, T> {
     }
 
     /// Newton steps from the forces as they are, whose certificate is `start`, while they gain. Leaves the last forces.
-    fn newton(&mut self, scratch: &mut Scratch<T>, start: Certificate) -> Certificate {
+    fn newton(&mut self, scratch: &mut Scratch, start: Certificate) -> Certificate {
         /// A step may lose before it gains: the states change under it.
         const MAX_LOSSES: usize = 2;
         let mut last = start;
         let mut losses = 0;
         while self.newton_steps < self.settings.max_newton_steps
-            && last.natural_residual > T::GOAL
+            && last.natural_residual > lcp::GOAL
             && losses <= MAX_LOSSES
             && !self.is_over()
         {
             self.newton_steps += 1;
             for (contact, state) in scratch.states.iter().enumerate() {
                 if *state == State::Open {
-                    self.forces[3 * contact..3 * contact + 3].fill(T::zero());
+                    self.forces[3 * contact..3 * contact + 3].fill(0.0);
                 }
             }
             self.update_gaps();
@@ -238,23 +234,23 @@ impl<T: Scalar> Run<'_, T> {
     }
 
     /// What each contact does, from the projection of its forces.
-    fn find_states(&self, scratch: &mut Scratch<T>) {
+    fn find_states(&self, scratch: &mut Scratch) {
         let problem = self.problem;
         for (contact, state) in scratch.states.iter_mut().enumerate() {
             let first = 3 * contact;
             let mu = problem.friction_coefficients()[contact];
             let diagonal = |axis: usize| problem.column(first + axis)[first + axis];
-            let per = |compliance: T| {
-                if compliance > T::zero() {
-                    T::one() / compliance
+            let per = |compliance: f64| {
+                if compliance > 0.0 {
+                    1.0 / compliance
                 } else {
-                    T::zero()
+                    0.0
                 }
             };
-            let along = per(T::of(0.5) * (diagonal(1) + diagonal(2)));
+            let along = per(0.5 * (diagonal(1) + diagonal(2)));
             let rho = [per(diagonal(0)), along, along];
             let trial = [0, 1, 2].map(|k| self.forces[first + k] - rho[k] * self.u[first + k]);
-            *state = if trial[0] <= T::zero() {
+            *state = if trial[0] <= 0.0 {
                 State::Open
             } else if cone::tangential(&trial) <= mu * trial[0] {
                 State::Stick

@@ -7,14 +7,15 @@
 //!
 //! Source: Lawson and Hanson, Solving Least Squares Problems (1974), chapter 23.
 
-use super::pivoting::{End, Factor, Outcome, Work};
-use super::{Scalar, dense};
+use super::dense;
+use super::ldl::Ldl;
+use super::pivoting::{End, Outcome, Work};
 
 /// Runs until no row is wrong. `held`: scratch of m. Leaves z ≥ 0.
-pub(super) fn solve<T: Scalar>(
-    work: &mut Work<T>,
-    factor: &mut impl Factor<T>,
-    held: &mut [T],
+pub(super) fn solve(
+    work: &mut Work,
+    factor: &mut Ldl,
+    held: &mut [f64],
     max_pivots: usize,
 ) -> Outcome {
     let m = work.problem.m();
@@ -24,9 +25,9 @@ pub(super) fn solve<T: Scalar>(
         pivots: 0,
     };
     let mut refused = None;
-    held.fill(T::zero());
+    held.fill(0.0);
     work.basis.start_empty(m);
-    work.z.fill(T::zero());
+    work.z.fill(0.0);
     work.w.copy_from_slice(work.problem.q());
     if factor.update(work.problem, work.basis.flags()).is_err() {
         outcome.end = End::Singular;
@@ -51,7 +52,7 @@ pub(super) fn solve<T: Scalar>(
                 return outcome;
             }
             // A new force that pulls contradicts its overlap: the overlap was round-off.
-            if is_first && work.z[entering] <= T::zero() {
+            if is_first && work.z[entering] <= 0.0 {
                 work.basis.exchange(entering);
                 work.z.copy_from_slice(held);
                 dense::gaps_into(work.problem, work.z, work.w);
@@ -67,10 +68,10 @@ pub(super) fn solve<T: Scalar>(
             for (held, &z) in held.iter_mut().zip(work.z.iter()) {
                 *held += step * (z - *held);
             }
-            held[leaving] = T::zero();
+            held[leaving] = 0.0;
             for (row, held) in held.iter_mut().enumerate() {
-                if work.basis.is_active(row) && *held <= T::zero() {
-                    *held = T::zero();
+                if work.basis.is_active(row) && *held <= 0.0 {
+                    *held = 0.0;
                     work.basis.exchange(row);
                     outcome.pivots += 1;
                 }
@@ -79,14 +80,10 @@ pub(super) fn solve<T: Scalar>(
     }
 }
 
-fn most_overlapping_row<T: Scalar>(
-    work: &Work<T>,
-    factor: &impl Factor<T>,
-    refused: Option<usize>,
-) -> Option<usize> {
+fn most_overlapping_row(work: &Work, factor: &Ldl, refused: Option<usize>) -> Option<usize> {
     let mut limits = work.limits();
     work.forces_limit(&mut limits, factor);
-    let mut most = (T::zero(), None);
+    let mut most = (0.0, None);
     for row in 0..work.problem.m() {
         if !work.basis.is_active(row) && work.may_be_active(row) && refused != Some(row) {
             let excess = work.excess(&limits, row);
@@ -99,16 +96,12 @@ fn most_overlapping_row<T: Scalar>(
 }
 
 /// The active row whose force reaches zero first on the way from `held` to z, and the part of the way.
-fn first_to_leave<T: Scalar>(
-    work: &Work<T>,
-    factor: &impl Factor<T>,
-    held: &[T],
-) -> Option<(usize, T)> {
-    let mut first: Option<(usize, T)> = None;
+fn first_to_leave(work: &Work, factor: &Ldl, held: &[f64]) -> Option<(usize, f64)> {
+    let mut first: Option<(usize, f64)> = None;
     for &row in factor.rows() {
         let row = row as usize;
-        if work.z[row] <= T::zero() {
-            let way = num_traits::Float::max(held[row] - work.z[row], T::min_positive_value());
+        if work.z[row] <= 0.0 {
+            let way = (held[row] - work.z[row]).max(f64::MIN_POSITIVE);
             let step = held[row] / way;
             if first.is_none_or(|(_, least)| step < least) {
                 first = Some((row, step));

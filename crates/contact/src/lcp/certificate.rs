@@ -1,7 +1,10 @@
 //! How well z fits M and q, computed from these three alone.
 
-use super::{Problem, Scalar, dense};
+use super::{Problem, dense};
 use crate::error::Error;
+
+/// A natural residual that needs no further step: a few hundred roundings.
+pub(crate) const GOAL: f64 = 5e-14;
 
 /// How well an answer fits the problem as given. All four numbers are 0 or round-off for a solution.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -18,11 +21,9 @@ pub struct Certificate {
 
 /// The certificate of forces `z` for `w = q + M z`, made from nothing but the data: for checking any solver.
 ///
-/// Sums in f64 whatever the scalar is.
-///
 /// # Errors
 /// [`Error::Length`] if z does not have m entries.
-pub fn check<T: Scalar>(problem: &Problem<T>, z: &[T]) -> Result<Certificate, Error> {
+pub fn check(problem: &Problem, z: &[f64]) -> Result<Certificate, Error> {
     if z.len() != problem.m() {
         return Err(Error::Length {
             what: "z",
@@ -33,17 +34,17 @@ pub fn check<T: Scalar>(problem: &Problem<T>, z: &[T]) -> Result<Certificate, Er
     let mut judge = Judge::new(problem, z);
     for (i, z_i) in z.iter().enumerate() {
         let products = z.iter().enumerate();
-        let products = products.map(|(j, z)| problem.column(j)[i].wide() * z.wide());
-        judge.row(z_i.wide(), problem.q()[i].wide() + products.sum::<f64>());
+        let products = products.map(|(j, z)| problem.column(j)[i] * z);
+        judge.row(*z_i, problem.q()[i] + products.sum::<f64>());
     }
     Ok(judge.certificate)
 }
 
 /// As [`check`] where w = q + M z is already there.
-pub(super) fn of<T: Scalar>(problem: &Problem<T>, z: &[T], w: &[T]) -> Certificate {
+pub(super) fn of(problem: &Problem, z: &[f64], w: &[f64]) -> Certificate {
     let mut judge = Judge::new(problem, z);
     for (z, w) in z.iter().zip(w) {
-        judge.row(z.wide(), w.wide());
+        judge.row(*z, *w);
     }
     judge.certificate
 }
@@ -55,10 +56,10 @@ struct Judge {
 }
 
 impl Judge {
-    fn new<T: Scalar>(problem: &Problem<T>, z: &[T]) -> Self {
+    fn new(problem: &Problem, z: &[f64]) -> Self {
         // Where all is zero the ratio is zero as well, so any positive size serves.
-        let per_size = |values: &[T]| {
-            let max = dense::max_abs(values).wide();
+        let per_size = |values: &[f64]| {
+            let max = dense::max_abs(values);
             if max > 0.0 {
                 1.0 / max.max(f64::MIN_POSITIVE)
             } else {
@@ -93,27 +94,30 @@ impl Judge {
     }
 }
 
+/// Of the sum of absolute terms in a proof that there is no solution: a thousand times above the regularisation,
+/// which bends y.
+const PROOF: f64 = 1e-9;
+
 /// Whether y proves that no z ≥ 0 gives w ≥ 0: y ≥ 0, Mᵀ y ≤ 0, qᵀ y < 0. Source: Farkas' lemma.
 ///
-/// Signs are judged to 1e-9 of the sum of absolute terms (1e-4 in f32): a thousand times above the regularisation,
-/// which bends y.
-pub(super) fn proves_no_solution<T: Scalar>(problem: &Problem<T>, y: &[T]) -> bool {
-    let weigh = |values: &[T]| {
+/// Signs are judged to [`PROOF`] of the sum of absolute terms.
+pub(super) fn proves_no_solution(problem: &Problem, y: &[f64]) -> bool {
+    let weigh = |values: &[f64]| {
         values
             .iter()
             .zip(y)
             .fold((0.0, 0.0), |(sum, size): (f64, f64), (v, y)| {
-                let term = v.wide() * y.wide();
+                let term = v * y;
                 (sum + term, size + term.abs())
             })
     };
     let (sum, size) = weigh(problem.q());
-    if !sum.is_finite() || sum >= -T::PROOF * size || y.iter().any(|&y| y < T::zero()) {
+    if !sum.is_finite() || sum >= -PROOF * size || y.iter().any(|&y| y < 0.0) {
         return false;
     }
     (0..problem.m()).all(|j| {
         let (sum, size) = weigh(problem.column(j));
-        sum <= T::PROOF * size
+        sum <= PROOF * size
     })
 }
 

@@ -1,15 +1,15 @@
 //! The few dense loops that all methods share. Order of summation is fixed: equal input, equal bits.
 
-use super::{Problem, Scalar};
+use super::Problem;
 
 /// w = q + M z, column by column, skipping the zeros of z.
-pub(crate) fn gaps_into<T: Scalar>(problem: &Problem<T>, z: &[T], w: &mut [T]) {
+pub(crate) fn gaps_into(problem: &Problem, z: &[f64], w: &mut [f64]) {
     w.copy_from_slice(problem.q());
     // Eight columns at a time: one load and store of w for eight products.
-    let mut columns = [(T::zero(), 0_usize); 8];
+    let mut columns = [(0.0, 0_usize); 8];
     let mut n = 0;
     for (j, &z) in z.iter().enumerate() {
-        if z != T::zero() {
+        if z != 0.0 {
             columns[n] = (z, j);
             n += 1;
             if n == 8 {
@@ -23,7 +23,7 @@ pub(crate) fn gaps_into<T: Scalar>(problem: &Problem<T>, z: &[T], w: &mut [T]) {
     }
 }
 
-fn add_eight<T: Scalar>(problem: &Problem<T>, columns: &[(T, usize); 8], w: &mut [T]) {
+fn add_eight(problem: &Problem, columns: &[(f64, usize); 8], w: &mut [f64]) {
     let m = w.len();
     let [a, b, c, d, e, f, g, h] = columns.map(|(_, j)| &problem.column(j)[..m]);
     let z = columns.map(|(z, _)| z);
@@ -35,48 +35,45 @@ fn add_eight<T: Scalar>(problem: &Problem<T>, columns: &[(T, usize); 8], w: &mut
 }
 
 /// y += a x.
-pub(super) fn add_scaled<T: Scalar>(y: &mut [T], a: T, x: &[T]) {
+pub(super) fn add_scaled(y: &mut [f64], a: f64, x: &[f64]) {
     for (y, &x) in y.iter_mut().zip(x) {
         *y += a * x;
     }
 }
 
 /// xᵀ y with eight partial sums, so that it is vectorised.
-pub(super) fn dot<T: Scalar>(x: &[T], y: &[T]) -> T {
+pub(super) fn dot(x: &[f64], y: &[f64]) -> f64 {
     let (x_chunks, x_rest) = x.as_chunks::<8>();
     let (y_chunks, y_rest) = y.as_chunks::<8>();
-    let mut sums = [T::zero(); 8];
+    let mut sums = [0.0; 8];
     for (x, y) in x_chunks.iter().zip(y_chunks) {
         for lane in 0..8 {
             sums[lane] += x[lane] * y[lane];
         }
     }
-    let rest: T = x_rest.iter().zip(y_rest).map(|(&x, &y)| x * y).sum();
+    let rest: f64 = x_rest.iter().zip(y_rest).map(|(&x, &y)| x * y).sum();
     let [a, b, c, d, e, f, g, h] = sums;
     ((a + e) + (b + f)) + ((c + g) + (d + h)) + rest
 }
 
 /// Largest absolute value, 0 for an empty slice. In lanes, so that it is vectorised.
-pub(super) fn max_abs<T: Scalar>(values: &[T]) -> T {
-    let larger = |max: T, x: T| {
-        let x = num_traits::Float::abs(x);
+pub(super) fn max_abs(values: &[f64]) -> f64 {
+    let larger = |max: f64, x: f64| {
+        let x = x.abs();
         if x > max { x } else { max }
     };
-    let mut lanes = [T::zero(); 8];
+    let mut lanes = [0.0; 8];
     let (chunks, rest) = values.as_chunks::<8>();
     for chunk in chunks {
         for (lane, &x) in lanes.iter_mut().zip(chunk) {
             *lane = larger(*lane, x);
         }
     }
-    lanes
-        .iter()
-        .chain(rest)
-        .fold(T::zero(), |max, &x| larger(max, x))
+    lanes.iter().chain(rest).fold(0.0, |max, &x| larger(max, x))
 }
 
 /// x ← L⁻¹ x for the leading `n` rows of a unit lower triangle, column-major with leading dimension `ld`.
-pub(super) fn solve_unit_lower<T: Scalar>(l: &[T], ld: usize, n: usize, x: &mut [T]) {
+pub(super) fn solve_unit_lower(l: &[f64], ld: usize, n: usize, x: &mut [f64]) {
     let x = &mut x[..n];
     let mut p = 0;
     // Four columns at a time: a small triangle, then their product with the rest.
@@ -108,7 +105,7 @@ pub(super) fn solve_unit_lower<T: Scalar>(l: &[T], ld: usize, n: usize, x: &mut 
 }
 
 /// x ← L⁻ᵀ x, as [`solve_unit_lower`].
-pub(super) fn solve_unit_lower_transposed<T: Scalar>(l: &[T], ld: usize, n: usize, x: &mut [T]) {
+pub(super) fn solve_unit_lower_transposed(l: &[f64], ld: usize, n: usize, x: &mut [f64]) {
     for p in (0..n).rev() {
         let column = &l[p * ld..p * ld + n];
         let below = dot(&column[p + 1..], &x[p + 1..n]);

@@ -1,17 +1,12 @@
 //! Projected Gauss-Seidel: the slow method that always has an answer to show.
 
-use super::{Problem, Scalar, Settings, certificate, dense};
+use super::{Problem, Settings, certificate, dense};
 
 /// Sweeps over the rows, each to its own solution, from z ≥ 0 and w = q + M z; both are kept up to date.
 ///
 /// Converges for symmetric positive semi-definite M with a solution. Rows without a positive diagonal are left.
 /// Returns the number of sweeps.
-pub(super) fn sweep<T: Scalar>(
-    problem: &Problem<T>,
-    settings: &Settings,
-    z: &mut [T],
-    w: &mut [T],
-) -> usize {
+pub(super) fn sweep(problem: &Problem, settings: &Settings, z: &mut [f64], w: &mut [f64]) -> usize {
     /// A certificate costs little beside this many sweeps.
     const SWEEPS_PER_CHECK: usize = 10;
     for n_sweeps in 0..settings.max_sweeps {
@@ -25,10 +20,10 @@ pub(super) fn sweep<T: Scalar>(
         }
         for row in 0..problem.m() {
             let diagonal = problem.diagonal(row);
-            if diagonal > T::zero() {
-                let target = num_traits::Float::max(z[row] - w[row] / diagonal, T::zero());
+            if diagonal > 0.0 {
+                let target = (z[row] - w[row] / diagonal).max(0.0);
                 let change = target - z[row];
-                if change != T::zero() {
+                if change != 0.0 {
                     z[row] = target;
                     dense::add_scaled(w, change, problem.column(row));
                 }

@@ -13,8 +13,18 @@ use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::triangular_solve::solve_unit_lower_triangular_in_place;
 use faer::{Accum, MatMut, Par, Spec};
 
-use super::pivoting::{Factor, Singular};
-use super::{Problem, Scalar, dense};
+use super::{Problem, dense};
+
+/// E / diag(M), added before factorising an active block that is singular to round-off: a thousand times the
+/// round-off of a factorisation of a few hundred rows, so that rank-deficient active sets stay
+/// solvable; small enough that one proximal step removes it up to condition 1e8.
+const REGULARISATION: f64 = 1e-12;
+
+/// A pivot below this times M_ii has lost its digits to the rows before it: the block is treated as singular.
+const SINGULAR: f64 = 1e-9;
+
+/// A pivot below minus this times M_ii is no round-off, so M is indefinite.
+const INDEFINITE: f64 = 1e-8;
 
 /// Fewer new rows than this are appended one by one.
 const BLOCK_ROWS: usize = 16;
@@ -22,14 +32,18 @@ const BLOCK_ROWS: usize = 16;
 /// More rows than this are not taken out of a factor: what follows the first of them is made anew.
 const MAX_REMOVED: usize = 32;
 
+/// The active block has no inverse: M is not what the method needs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Singular;
+
 /// What is known about the factor in the memory beside it. Lives as long as the scratch.
 #[derive(Debug, Clone)]
-pub(super) struct LdlState<T> {
+pub(super) struct LdlState {
     /// Rows of M in the order of the factor.
     rows: Vec<u32>,
     is_in: Vec<bool>,
     removed: Vec<usize>,
-    work: Vec<T>,
+    work: Vec<f64>,
     stack: Vec<MaybeUninit<u8>>,
     /// Rows of the problem the factor belongs to.
     m: usize,
@@ -46,17 +60,17 @@ fn leading_dimension(m: usize) -> usize {
     m.next_multiple_of(8) + 8
 }
 
-impl<T: Scalar> LdlState<T> {
+impl LdlState {
     pub(super) fn new(capacity: usize) -> Self {
         let factor =
-            ldlt::factor::cholesky_in_place_scratch::<T>(capacity, Par::Seq, Spec::default());
+            ldlt::factor::cholesky_in_place_scratch::<f64>(capacity, Par::Seq, Spec::default());
         let n_removed = MAX_REMOVED.min(capacity);
-        let update = ldlt::update::delete_rows_and_cols_clobber_scratch::<T>(capacity, n_removed);
+        let update = ldlt::update::delete_rows_and_cols_clobber_scratch::<f64>(capacity, n_removed);
         Self {
             rows: Vec::with_capacity(capacity),
             is_in: Vec::with_capacity(capacity),
             removed: Vec::with_capacity(capacity),
-            work: vec![T::zero(); capacity],
+            work: vec![0.0; capacity],
             stack: vec![MaybeUninit::uninit(); factor.or(update).unaligned_bytes_required()],
             m: 0,
             is_regularised: false,
@@ -74,20 +88,20 @@ impl<T: Scalar> LdlState<T> {
     }
 }
 
-/// `M_FF = L D Lᵀ`, or `M_FF + E` with E = [`REGULARISATION`](super::scalar::sealed::Number::REGULARISATION) diag(M)
-/// once a pivot shows that M_FF is singular to round-off.
+/// `M_FF = L D Lᵀ`, or `M_FF + E` with E = [`REGULARISATION`] diag(M) once a pivot shows that M_FF is singular to
+/// round-off.
 ///
 /// No square roots: rows and columns scaled by powers of two give the same bits.
-pub(super) struct Ldl<'a, T> {
+pub(super) struct Ldl<'a> {
     /// Column-major: L below the diagonal, D on it, work above.
-    memory: &'a mut [T],
-    state: &'a mut LdlState<T>,
+    memory: &'a mut [f64],
+    state: &'a mut LdlState,
     ld: usize,
 }
 
-impl<'a, T: Scalar> Ldl<'a, T> {
+impl<'a> Ldl<'a> {
     /// Without rows.
-    pub(super) fn new(memory: &'a mut [T], state: &'a mut LdlState<T>, m: usize) -> Self {
+    pub(super) fn new(memory: &'a mut [f64], state: &'a mut LdlState, m: usize) -> Self {
         state.forget();
         let ldl = Self::kept(memory, state, m);
         ldl.state.m = m;
@@ -99,12 +113,46 @@ impl<'a, T: Scalar> Ldl<'a, T> {
     }
 
     /// With the factor that is there, see [`LdlState::holds`].
-    pub(super) fn kept(memory: &'a mut [T], state: &'a mut LdlState<T>, m: usize) -> Self {
+    pub(super) fn kept(memory: &'a mut [f64], state: &'a mut LdlState, m: usize) -> Self {
         Self {
             memory,
             state,
             ld: leading_dimension(m),
         }
+    }
+
+    /// E / diag(M), added before factorising.
+    pub(super) fn regularisation(&self) -> f64 {
+        if self.state.is_regularised {
+            REGULARISATION
+        } else {
+            0.0
+        }
+    }
+
+    /// The rows of the factor, in its order.
+    pub(super) fn rows(&self) -> &[u32] {
+        &self.state.rows
+    }
+
+    /// Makes it the factor of the active rows.
+    pub(super) fn update(&mut self, problem: &Problem, is_active: &[bool]) -> Result<(), Singular> {
+        self.remove(is_active);
+        let outcome = self.append(problem, is_active);
+        if outcome.is_err() {
+            self.state.forget();
+        }
+        outcome
+    }
+
+    /// x ← (M_FF + E)⁻¹ x, in the order of [`Ldl::rows`].
+    pub(super) fn solve(&mut self, x: &mut [f64]) {
+        let (ld, n) = (self.ld, self.state.rows.len());
+        dense::solve_unit_lower(self.memory, ld, n, x);
+        for (p, x) in x.iter_mut().enumerate() {
+            *x /= self.memory[p * ld + p];
+        }
+        dense::solve_unit_lower_transposed(self.memory, ld, n, x);
     }
 
     /// Takes out the rows that are not active any more.
@@ -140,7 +188,7 @@ impl<'a, T: Scalar> Ldl<'a, T> {
     }
 
     /// Appends the active rows that are not in yet.
-    fn append(&mut self, problem: &Problem<T>, is_active: &[bool]) -> Result<(), Singular> {
+    fn append(&mut self, problem: &Problem, is_active: &[bool]) -> Result<(), Singular> {
         let n = self.state.rows.len();
         for (row, &is_active) in is_active.iter().enumerate() {
             if is_active && !self.state.is_in[row] {
@@ -165,7 +213,7 @@ impl<'a, T: Scalar> Ldl<'a, T> {
     }
 
     /// Appends one row behind `n` others.
-    fn push(&mut self, problem: &Problem<T>, n: usize) -> Result<(), Singular> {
+    fn push(&mut self, problem: &Problem, n: usize) -> Result<(), Singular> {
         let ld = self.ld;
         let state = &mut *self.state;
         let factor = &mut *self.memory;
@@ -178,7 +226,7 @@ impl<'a, T: Scalar> Ldl<'a, T> {
         // The new row of L D, then of L, and what remains on the diagonal.
         dense::solve_unit_lower(factor, ld, n, work);
         let diagonal = column[row];
-        let mut removed = T::zero();
+        let mut removed = 0.0;
         for (p, &x) in work.iter().enumerate() {
             let l = x / factor[p * ld + p];
             factor[p * ld + n] = l;
@@ -186,13 +234,13 @@ impl<'a, T: Scalar> Ldl<'a, T> {
         }
         let mut pivot = diagonal - removed;
         if state.is_regularised {
-            let regularisation = T::of(T::REGULARISATION) * diagonal;
+            let regularisation = REGULARISATION * diagonal;
             pivot += regularisation;
-            if pivot.is_nan() || pivot <= -T::of(T::INDEFINITE) * diagonal {
+            if pivot.is_nan() || pivot <= -INDEFINITE * diagonal {
                 return Err(Singular);
             }
             // A row that depends on the others leaves round-off of either sign.
-            pivot = num_traits::Float::max(pivot, regularisation);
+            pivot = pivot.max(regularisation);
         } else if !has_digits(pivot, diagonal) {
             return Err(Singular);
         }
@@ -201,7 +249,7 @@ impl<'a, T: Scalar> Ldl<'a, T> {
     }
 
     /// Appends all rows behind the first `n` at once.
-    fn append_block(&mut self, problem: &Problem<T>, n: usize) -> Result<(), Singular> {
+    fn append_block(&mut self, problem: &Problem, n: usize) -> Result<(), Singular> {
         let ld = self.ld;
         let state = &mut *self.state;
         let n_all = state.rows.len();
@@ -223,7 +271,7 @@ impl<'a, T: Scalar> Ldl<'a, T> {
             // L X = M_12 gives X = D L_21ᵀ.
             let factor = top_left.as_ref();
             solve_unit_lower_triangular_in_place(factor, top_right.as_mut(), Par::Seq);
-            let pivots: DiagRef<T> = factor.diagonal();
+            let pivots: DiagRef<f64> = factor.diagonal();
             for p in 0..n {
                 let pivot = pivots[p];
                 for j in 0..n_all - n {
@@ -238,7 +286,7 @@ impl<'a, T: Scalar> Ldl<'a, T> {
                 BlockStructure::Rectangular,
                 top_right.as_ref(),
                 BlockStructure::Rectangular,
-                -T::one(),
+                -1.0,
                 Par::Seq,
             );
         }
@@ -259,38 +307,6 @@ impl<'a, T: Scalar> Ldl<'a, T> {
 }
 
 /// Whether a pivot is more than what round-off left of the diagonal entry. False for NaN.
-fn has_digits<T: Scalar>(pivot: T, diagonal: T) -> bool {
-    pivot > T::of(T::SINGULAR) * diagonal
-}
-
-impl<T: Scalar> Factor<T> for Ldl<'_, T> {
-    fn regularisation(&self) -> f64 {
-        if self.state.is_regularised {
-            T::REGULARISATION
-        } else {
-            0.0
-        }
-    }
-
-    fn rows(&self) -> &[u32] {
-        &self.state.rows
-    }
-
-    fn update(&mut self, problem: &Problem<T>, is_active: &[bool]) -> Result<(), Singular> {
-        self.remove(is_active);
-        let outcome = self.append(problem, is_active);
-        if outcome.is_err() {
-            self.state.forget();
-        }
-        outcome
-    }
-
-    fn solve(&mut self, x: &mut [T]) {
-        let (ld, n) = (self.ld, self.state.rows.len());
-        dense::solve_unit_lower(self.memory, ld, n, x);
-        for (p, x) in x.iter_mut().enumerate() {
-            *x /= self.memory[p * ld + p];
-        }
-        dense::solve_unit_lower_transposed(self.memory, ld, n, x);
-    }
+fn has_digits(pivot: f64, diagonal: f64) -> bool {
+    pivot > SINGULAR * diagonal
 }

@@ -5,61 +5,45 @@
 //!
 //! Source: Júdice and Pires (1994), Computers & Operations Research 21; Kim and Park (2011), SIAM J. Sci. Comput. 33.
 
-use super::{Problem, Scalar, Settings, Start, dense};
+use super::ldl::{Ldl, Singular};
+use super::{Problem, Settings, Start, dense};
 
 /// Rounds that may exchange all wrong rows without lowering their number. 3 as in the source.
 const PATIENCE: usize = 3;
+
+/// What counts as a wrong sign, of the largest value: above the round-off of well-conditioned rows, far below the
+/// default tolerance of an answer.
+const WRONG: f64 = 1e-13;
 
 /// A cold start takes the rows deeper than this share of the deepest. ½ is where the contact of a smooth body ends
 /// (Hertz: a² = R d, while the bodies overlap up to 2 R d); blunter ones end deeper, a cone at 0.36.
 const COLD_START_DEPTH: f64 = 0.5;
 
-/// The active block has no inverse, or M is not what the method needs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Singular;
-
-/// A factorisation of M over the active rows.
-pub(super) trait Factor<T: Scalar> {
-    /// E / diag(M), added before factorising.
-    fn regularisation(&self) -> f64;
-
-    /// The rows of the factor, in its order.
-    fn rows(&self) -> &[u32];
-
-    /// Makes it the factor of the active rows.
-    fn update(&mut self, problem: &Problem<T>, is_active: &[bool]) -> Result<(), Singular>;
-
-    /// x ← (M_FF + E)⁻¹ x, in the order of [`Factor::rows`].
-    fn solve(&mut self, x: &mut [T]);
-}
-
 /// The active rows.
 #[derive(Debug, Clone)]
-pub(super) struct Basis<T> {
+pub(super) struct Basis {
     is_active: Vec<bool>,
     wrong: Vec<u32>,
-    x: Vec<T>,
+    x: Vec<f64>,
 }
 
-impl<T: Scalar> Basis<T> {
+impl Basis {
     pub(super) fn new(capacity: usize) -> Self {
         Self {
             is_active: Vec::with_capacity(capacity),
             wrong: Vec::with_capacity(capacity),
-            x: vec![T::zero(); capacity],
+            x: vec![0.0; capacity],
         }
     }
 
     /// The rows of the warm start; without one the deep rows. `scale`: size of each row.
-    pub(super) fn start(&mut self, problem: &Problem<T>, start: Start, scale: &[T]) {
-        let has_diagonal = |row: usize| problem.diagonal(row) > T::zero();
+    pub(super) fn start(&mut self, problem: &Problem, start: Start, scale: &[f64]) {
+        let has_diagonal = |row: usize| problem.diagonal(row) > 0.0;
         match start {
             Start::Cold => {
                 let depth = |row: usize| problem.q()[row] / scale[row];
-                let deepest = (0..problem.m())
-                    .map(depth)
-                    .fold(T::zero(), num_traits::Float::min);
-                let limit = T::of(COLD_START_DEPTH) * deepest;
+                let deepest = (0..problem.m()).map(depth).fold(0.0, f64::min);
+                let limit = COLD_START_DEPTH * deepest;
                 self.start_from(problem.m(), |row| depth(row) < limit && has_diagonal(row));
             }
             Start::Rows(rows) => self.start_from(problem.m(), |i| rows[i] && has_diagonal(i)),
@@ -69,8 +53,8 @@ impl<T: Scalar> Basis<T> {
     }
 
     /// The rows with force.
-    pub(super) fn start_from_forces(&mut self, z: &[T]) {
-        self.start_from(z.len(), |i| z[i] > T::zero());
+    pub(super) fn start_from_forces(&mut self, z: &[f64]) {
+        self.start_from(z.len(), |i| z[i] > 0.0);
     }
 
     /// No rows.
@@ -105,7 +89,7 @@ pub(super) enum End {
     Complementary,
     /// The budget ended first.
     Budget,
-    /// A block could not be factorised.
+    /// A block could not be factorised: M is indefinite.
     Singular,
 }
 
@@ -120,26 +104,22 @@ pub(super) struct Outcome {
 }
 
 /// The problem `w = q - E center + (M + E) z` and its state.
-pub(super) struct Work<'a, T> {
-    pub(super) problem: &'a Problem<'a, T>,
+pub(super) struct Work<'a> {
+    pub(super) problem: &'a Problem<'a>,
     pub(super) settings: &'a Settings,
-    pub(super) scale: &'a [T],
+    pub(super) scale: &'a [f64],
     /// Power of two: scale² unit = diag(M).
-    pub(super) unit: T,
+    pub(super) unit: f64,
     /// Forces from which a solve starts; None: zero.
-    pub(super) center: Option<&'a [T]>,
-    pub(super) basis: &'a mut Basis<T>,
-    pub(super) z: &'a mut [T],
-    pub(super) w: &'a mut [T],
+    pub(super) center: Option<&'a [f64]>,
+    pub(super) basis: &'a mut Basis,
+    pub(super) z: &'a mut [f64],
+    pub(super) w: &'a mut [f64],
 }
 
-impl<T: Scalar> Work<'_, T> {
+impl Work<'_> {
     /// Pivots until no row is wrong. Leaves z (active rows as solved, others 0) and w = q + M z.
-    pub(super) fn block_pivoting(
-        &mut self,
-        factor: &mut impl Factor<T>,
-        max_rounds: usize,
-    ) -> Outcome {
+    pub(super) fn block_pivoting(&mut self, factor: &mut Ldl, max_rounds: usize) -> Outcome {
         let mut outcome = Outcome {
             end: End::Complementary,
             rounds: 0,
@@ -182,19 +162,19 @@ impl<T: Scalar> Work<'_, T> {
     }
 
     /// z of the active rows from their zero gaps, then all gaps.
-    pub(super) fn solve_active(&mut self, factor: &mut impl Factor<T>) -> Result<(), Singular> {
+    pub(super) fn solve_active(&mut self, factor: &mut Ldl) -> Result<(), Singular> {
         let basis = &mut *self.basis;
         factor.update(self.problem, &basis.is_active)?;
         let x = &mut basis.x[..factor.rows().len()];
         // Forces of the active rows start from the centre; what is missing follows from the gaps left.
         let gaps = if let Some(center) = self.center {
             for ((z, &center), &is_active) in self.z.iter_mut().zip(center).zip(&basis.is_active) {
-                *z = if is_active { center } else { T::zero() };
+                *z = if is_active { center } else { 0.0 };
             }
             dense::gaps_into(self.problem, self.z, self.w);
             &*self.w
         } else {
-            self.z.fill(T::zero());
+            self.z.fill(0.0);
             self.problem.q()
         };
         for (x, &row) in x.iter_mut().zip(factor.rows()) {
@@ -209,37 +189,37 @@ impl<T: Scalar> Work<'_, T> {
     }
 
     /// From where on a force or a gap is wrong, but for what depends on the forces.
-    pub(super) fn limits(&self) -> Limits<T> {
+    pub(super) fn limits(&self) -> Limits {
         let mut limits = Limits::default();
         for (&q, &scale) in self.problem.q().iter().zip(self.scale) {
-            let q = num_traits::Float::abs(q);
-            limits.w = num_traits::Float::max(limits.w, q);
-            limits.w_scaled = num_traits::Float::max(limits.w_scaled, q / scale);
+            let q = q.abs();
+            limits.w = limits.w.max(q);
+            limits.w_scaled = limits.w_scaled.max(q / scale);
         }
-        limits.w *= T::of(T::WRONG);
-        limits.w_scaled *= T::of(T::WRONG);
+        limits.w *= WRONG;
+        limits.w_scaled *= WRONG;
         limits
     }
 
     /// The rest of [`Work::limits`], for the forces as they are.
-    pub(super) fn forces_limit(&self, limits: &mut Limits<T>, factor: &impl Factor<T>) {
-        let (mut z_max, mut z_sum) = (T::zero(), T::zero());
+    pub(super) fn forces_limit(&self, limits: &mut Limits, factor: &Ldl) {
+        let (mut z_max, mut z_sum) = (0.0_f64, 0.0);
         for &row in factor.rows() {
-            let z = num_traits::Float::abs(self.z[row as usize] * self.scale[row as usize]);
+            let z = (self.z[row as usize] * self.scale[row as usize]).abs();
             z_sum += z;
-            z_max = num_traits::Float::max(z_max, z);
+            z_max = z_max.max(z);
         }
-        limits.regularisation = T::of(factor.regularisation());
-        limits.z = T::of(T::WRONG) * z_max;
+        limits.regularisation = factor.regularisation();
+        limits.z = WRONG * z_max;
         // w_i is a sum of terms up to sqrt(M_ii M_jj) z_j.
-        limits.w_round_off = T::of(8.0) * T::epsilon() * z_sum * self.unit;
+        limits.w_round_off = 8.0 * f64::EPSILON * z_sum * self.unit;
     }
 
-    fn find_wrong(&mut self, limits: &Limits<T>) {
+    fn find_wrong(&mut self, limits: &Limits) {
         let mut wrong = std::mem::take(&mut self.basis.wrong);
         wrong.clear();
         for row in 0..self.problem.m() {
-            if self.excess(limits, row) > T::zero() && self.may_be_active(row) {
+            if self.excess(limits, row) > 0.0 && self.may_be_active(row) {
                 wrong.push(row as u32);
             }
         }
@@ -247,7 +227,7 @@ impl<T: Scalar> Work<'_, T> {
     }
 
     /// By how much a row is wrong, scaled; not positive for a right one.
-    pub(super) fn excess(&self, limits: &Limits<T>, row: usize) -> T {
+    pub(super) fn excess(&self, limits: &Limits, row: usize) -> f64 {
         let scale = self.scale[row];
         if self.basis.is_active[row] {
             return -self.z[row] * scale - limits.z;
@@ -256,38 +236,26 @@ impl<T: Scalar> Work<'_, T> {
         if let Some(center) = self.center {
             gap -= limits.regularisation * self.problem.diagonal(row) * center[row];
         }
-        if gap > T::zero() {
+        if gap > 0.0 {
             // Right, and no division.
             return -gap;
         }
-        let allowed = num_traits::Float::min(limits.w_scaled, limits.w / scale);
+        let allowed = limits.w_scaled.min(limits.w / scale);
         -gap / scale - allowed - limits.w_round_off
     }
 
     /// Rows without stiffness of their own never carry force.
     pub(super) fn may_be_active(&self, row: usize) -> bool {
-        self.problem.diagonal(row) > T::zero()
+        self.problem.diagonal(row) > 0.0
     }
 }
 
 /// Tolerances of one state, see [`Work::limits`].
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Limits<T> {
-    regularisation: T,
-    z: T,
-    w: T,
-    w_scaled: T,
-    w_round_off: T,
-}
-
-impl<T: Scalar> Default for Limits<T> {
-    fn default() -> Self {
-        Self {
-            regularisation: T::zero(),
-            z: T::zero(),
-            w: T::zero(),
-            w_scaled: T::zero(),
-            w_round_off: T::zero(),
-        }
-    }
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Limits {
+    regularisation: f64,
+    z: f64,
+    w: f64,
+    w_scaled: f64,
+    w_round_off: f64,
 }

@@ -1,35 +1,38 @@
 //! The data of a complementarity problem, checked once.
 
-use super::Scalar;
 use crate::error::Error;
+
+/// Of the diagonal: above the round-off of a computed compliance, far below any true skewness.
+const SKEW: f64 = 1e-10;
 
 /// A complementarity problem, borrowed: column-major `matrix` (m x m) and `q` (m).
 #[derive(Debug, Clone, Copy)]
-pub struct Problem<'a, T = f64> {
+pub struct Problem<'a> {
     m: usize,
-    matrix: &'a [T],
-    q: &'a [T],
+    matrix: &'a [f64],
+    q: &'a [f64],
     is_symmetric: bool,
 }
 
-impl<'a, T: Scalar> Problem<'a, T> {
-    /// Any M: checks the data and finds out whether M is symmetric (to 1e-10 of the diagonal, 1e-5 in f32).
+impl<'a> Problem<'a> {
+    /// Any M: checks the data and finds out whether M is symmetric, see [`Problem::symmetric`]. One that is not
+    /// can be judged by [`check`](super::check); [`solve`](super::solve) refuses it.
     ///
     /// Does not allocate. Cost: two passes over M.
     ///
     /// # Errors
     /// [`Error::Length`] unless M is square of the size of q; [`Error::NotFinite`].
-    pub fn new(matrix: &'a [T], q: &'a [T]) -> Result<Self, Error> {
+    pub fn new(matrix: &'a [f64], q: &'a [f64]) -> Result<Self, Error> {
         let mut problem = Self::trusted_symmetric(matrix, q)?;
         problem.is_symmetric = problem.skew_entry().is_none();
         Ok(problem)
     }
 
-    /// An M that must be symmetric, as that of frictionless contact is.
+    /// An M that must be symmetric (to 1e-10 of the diagonal), as that of frictionless contact is.
     ///
     /// # Errors
     /// As [`Problem::new`], and [`Error::NotSymmetric`] with the first pair of entries that differ by more than round-off.
-    pub fn symmetric(matrix: &'a [T], q: &'a [T]) -> Result<Self, Error> {
+    pub fn symmetric(matrix: &'a [f64], q: &'a [f64]) -> Result<Self, Error> {
         let problem = Self::trusted_symmetric(matrix, q)?;
         match problem.skew_entry() {
             None => Ok(problem),
@@ -42,7 +45,7 @@ impl<'a, T: Scalar> Problem<'a, T> {
     ///
     /// # Errors
     /// As [`Problem::new`].
-    pub fn trusted_symmetric(matrix: &'a [T], q: &'a [T]) -> Result<Self, Error> {
+    pub fn trusted_symmetric(matrix: &'a [f64], q: &'a [f64]) -> Result<Self, Error> {
         let m = q.len();
         if matrix.len() != m * m {
             return Err(Error::Length {
@@ -67,29 +70,29 @@ impl<'a, T: Scalar> Problem<'a, T> {
     }
 
     /// M, column-major.
-    pub fn matrix(&self) -> &'a [T] {
+    pub fn matrix(&self) -> &'a [f64] {
         self.matrix
     }
 
     /// q.
-    pub fn q(&self) -> &'a [T] {
+    pub fn q(&self) -> &'a [f64] {
         self.q
     }
 
-    /// Whether M is treated as symmetric.
+    /// Whether M counts as symmetric.
     pub fn is_symmetric(&self) -> bool {
         self.is_symmetric
     }
 
-    pub(super) fn column(&self, j: usize) -> &'a [T] {
+    pub(super) fn column(&self, j: usize) -> &'a [f64] {
         &self.matrix[j * self.m..(j + 1) * self.m]
     }
 
-    pub(super) fn diagonal(&self, i: usize) -> T {
+    pub(super) fn diagonal(&self, i: usize) -> f64 {
         self.matrix[i * self.m + i]
     }
 
-    /// For methods that need symmetry.
+    /// For the solvers.
     pub(super) fn require_symmetric(&self) -> Result<(), Error> {
         if self.is_symmetric {
             return Ok(());
@@ -102,8 +105,8 @@ impl<'a, T: Scalar> Problem<'a, T> {
         Error::NotSymmetric {
             row,
             column,
-            value: self.column(column)[row].wide(),
-            mirrored: self.column(row)[column].wide(),
+            value: self.column(column)[row],
+            mirrored: self.column(row)[column],
         }
     }
 
@@ -117,31 +120,27 @@ impl<'a, T: Scalar> Problem<'a, T> {
     }
 
     fn is_skew(&self, row: usize, column: usize) -> bool {
-        let difference = self.column(column)[row].wide() - self.column(row)[column].wide();
-        let size = (self.diagonal(row).wide() * self.diagonal(column).wide()).abs();
-        // T's default tolerance: above the round-off of a computed compliance, far below any true skewness.
-        difference * difference > T::TOLERANCE * T::TOLERANCE * size
+        let difference = self.column(column)[row] - self.column(row)[column];
+        let size = (self.diagonal(row) * self.diagonal(column)).abs();
+        difference * difference > SKEW * SKEW * size
     }
 }
 
-fn check_finite<T: Scalar>(what: &'static str, values: &[T]) -> Result<(), Error> {
+fn check_finite(what: &'static str, values: &[f64]) -> Result<(), Error> {
     // A sum is finite only if all its terms are: one pass at the speed of memory. A sum that is not may have
     // overflowed; then, and only then, one by one.
-    let mut sums = [T::zero(); 16];
+    let mut sums = [0.0; 16];
     let (chunks, rest) = values.as_chunks::<16>();
     for chunk in chunks {
         for lane in 0..16 {
             sums[lane] += chunk[lane];
         }
     }
-    let sum = sums.iter().chain(rest).copied().sum::<T>();
-    if num_traits::Float::is_finite(sum) {
+    let sum = sums.iter().chain(rest).copied().sum::<f64>();
+    if sum.is_finite() {
         return Ok(());
     }
-    match values
-        .iter()
-        .position(|x| !num_traits::Float::is_finite(*x))
-    {
+    match values.iter().position(|x| !x.is_finite()) {
         Some(index) => Err(Error::NotFinite { what, index }),
         None => Ok(()),
     }

@@ -2,31 +2,31 @@
 
 use super::certificate::{self, proves_no_solution};
 use super::ldl::Ldl;
-use super::lu::Lu;
-use super::pivoting::Work;
+use super::pivoting::{End, Work};
 use super::{
-    Certificate, Method, Problem, Scalar, Scratch, Settings, Solution, Start, Status, active_set,
-    dense, gauss_seidel, lemke, pivoting, scaling,
+    Certificate, Method, Problem, Scratch, Settings, Solution, Start, Status, active_set, dense,
+    gauss_seidel, scaling,
 };
 use crate::error::Error;
 
 /// Everything a solve is asked with, but where it starts and where it writes.
-pub struct Request<'a, T: Scalar> {
-    pub(super) problem: &'a Problem<'a, T>,
+pub(super) struct Request<'a> {
+    pub(super) problem: &'a Problem<'a>,
     pub(super) settings: &'a Settings,
-    pub(super) scratch: &'a mut Scratch<T>,
+    pub(super) scratch: &'a mut Scratch,
     /// Which method alone; None: the chain that fits the problem.
     pub(super) only: Option<Method>,
 }
 
 /// Checks what the types cannot, and solves.
-pub(super) fn solve<T: Scalar>(
-    request: &mut Request<T>,
+pub(super) fn solve(
+    request: &mut Request,
     start: Start,
-    z: &mut [T],
-    w: &mut [T],
+    z: &mut [f64],
+    w: &mut [f64],
 ) -> Result<Solution, Error> {
     let problem = request.problem;
+    problem.require_symmetric()?;
     let m = problem.m();
     if m > request.scratch.capacity {
         return Err(Error::Capacity {
@@ -47,9 +47,6 @@ pub(super) fn solve<T: Scalar>(
                 actual,
             });
         }
-    }
-    if matches!(request.only, Some(Method::ActiveSet | Method::GaussSeidel)) {
-        problem.require_symmetric()?;
     }
     let mut run = Run {
         problem,
@@ -74,8 +71,8 @@ pub(super) fn solve<T: Scalar>(
 }
 
 /// One solve: the problem and the counters.
-struct Run<'a, T: Scalar> {
-    problem: &'a Problem<'a, T>,
+struct Run<'a> {
+    problem: &'a Problem<'a>,
     settings: &'a Settings,
     rounds: usize,
     pivots: usize,
@@ -85,15 +82,15 @@ struct Run<'a, T: Scalar> {
 }
 
 /// The best forces so far and how good they are.
-struct Best<'a, T> {
-    z: &'a mut [T],
+struct Best<'a> {
+    z: &'a mut [f64],
     residual: f64,
 }
 
-impl<'a, T: Scalar> Best<'a, T> {
+impl<'a> Best<'a> {
     /// No force, as good as nothing.
-    fn none(z: &'a mut [T]) -> Self {
-        z.fill(T::zero());
+    fn none(z: &'a mut [f64]) -> Self {
+        z.fill(0.0);
         Self {
             z,
             residual: f64::INFINITY,
@@ -101,7 +98,7 @@ impl<'a, T: Scalar> Best<'a, T> {
     }
 
     /// Whether z is better than all before; keeps it then.
-    fn offer(&mut self, z: &[T], residual: f64) -> bool {
+    fn offer(&mut self, z: &[f64], residual: f64) -> bool {
         let is_better = residual < self.residual;
         if is_better {
             self.residual = residual;
@@ -111,76 +108,74 @@ impl<'a, T: Scalar> Best<'a, T> {
     }
 
     /// Writes the best forces and their gaps.
-    fn give(&self, problem: &Problem<T>, z: &mut [T], w: &mut [T]) {
+    fn give(&self, problem: &Problem, z: &mut [f64], w: &mut [f64]) {
         z.copy_from_slice(self.z);
         dense::gaps_into(problem, z, w);
     }
 }
 
-impl<T: Scalar> Run<'_, T> {
+impl Run<'_> {
     /// Writes z and w; the scratch is large enough.
     fn solve(
         &mut self,
-        scratch: &mut Scratch<T>,
+        scratch: &mut Scratch,
         only: Option<Method>,
         start: Start,
-        z: &mut [T],
-        w: &mut [T],
+        z: &mut [f64],
+        w: &mut [f64],
     ) -> (Status, Method) {
         let problem = self.problem;
-        z.fill(T::zero());
+        z.fill(0.0);
         w.copy_from_slice(problem.q());
-        if problem.q().iter().all(|&q| q >= T::zero()) {
+        if problem.q().iter().all(|&q| q >= 0.0) {
             return (Status::Solved, Method::Open);
         }
         // A closed row that no force opens is the simplest proof that there is no solution.
         if let Some(row) = self.closed_row_without_help() {
             let proof = &mut scratch.trial[..problem.m()];
-            proof.fill(T::zero());
-            proof[row] = T::one();
+            proof.fill(0.0);
+            proof[row] = 1.0;
             if proves_no_solution(problem, proof) {
                 return (Status::NoSolution, Method::Open);
             }
         }
         let diagonal = scaling::row_scale_into(problem, &mut scratch.scale);
         scratch.unit = diagonal.unit;
-        match only {
-            Some(Method::Lemke) => return self.lemke(scratch, f64::INFINITY, z, w),
-            Some(Method::GaussSeidel) => return self.gauss_seidel(scratch, z, w),
-            _ => {}
+        if only == Some(Method::GaussSeidel) {
+            return self.gauss_seidel(scratch, z, w);
         }
-        if problem.is_symmetric()
-            && diagonal.is_semidefinite_diagonal
+        if diagonal.may_be_semidefinite
             && let Some(outcome) = self.semidefinite(scratch, only, start, z, w)
         {
             return outcome;
         }
-        if only == Some(Method::ActiveSet) {
-            // Indefinite: not a problem for this method.
-            z.fill(T::zero());
-            w.copy_from_slice(problem.q());
-            return (Status::Budget, Method::ActiveSet);
+        // No method is made for it, but sweeps from the best answer so far may end at a solution.
+        match only {
+            None => match self.sweep_and_solve(scratch, z, w) {
+                (Status::Budget, method) => (Status::Indefinite, method),
+                outcome => outcome,
+            },
+            Some(method) => (Status::Indefinite, method),
         }
-        self.general(scratch, only, start, diagonal.is_positive_diagonal, z, w)
     }
 
     fn closed_row_without_help(&self) -> Option<usize> {
         let problem = self.problem;
         (0..problem.m()).find(|&i| {
-            problem.q()[i] < T::zero()
-                && problem.diagonal(i) <= T::zero()
-                && (0..problem.m()).all(|j| problem.column(j)[i] <= T::zero())
+            problem.q()[i] < 0.0
+                && problem.diagonal(i) <= 0.0
+                && (0..problem.m()).all(|j| problem.column(j)[i] <= 0.0)
         })
     }
 
-    /// Symmetric M with a diagonal that may be semi-definite. None: it is indefinite after all.
+    /// M with a diagonal that may be semi-definite. None: it is indefinite after all, z is the best so far.
     fn semidefinite(
         &mut self,
-        scratch: &mut Scratch<T>,
+        scratch: &mut Scratch,
         only: Option<Method>,
         start: Start,
-        z: &mut [T],
-        w: &mut [T],
+        z: &mut [f64],
+        w: &mut [f64],
     ) -> Option<(Status, Method)> {
         /// Proximal steps. The first removes the regularisation where M is well conditioned, two or three do
         /// on singular M; more are needed only close to infeasibility.
@@ -195,9 +190,9 @@ impl<T: Scalar> Run<'_, T> {
         };
         let mut method = Method::BlockPivoting;
         let mut best = Best::none(&mut scratch.best_z[..m]);
-        let mut is_best_current = false;
-        let mut last_certificate = Certificate::default();
-        let mut is_first_step = true;
+        // Of z, where it is the best.
+        let mut certificate_of_best = None;
+        let (mut is_first_step, mut is_indefinite) = (true, false);
         scratch.basis.start(problem, start, &scratch.scale);
         let mut factor = if may_keep {
             Ldl::kept(&mut scratch.dense, &mut scratch.ldl, m)
@@ -217,26 +212,14 @@ impl<T: Scalar> Run<'_, T> {
                 w,
             };
             is_first_step = false;
-            let rounds_left = (self.settings.max_rounds + 1).saturating_sub(self.rounds);
-            let mut outcome = pivoting::Outcome {
-                end: pivoting::End::Budget,
-                rounds: 0,
-                pivots: 0,
-            };
-            if only != Some(Method::ActiveSet) {
-                outcome = work.block_pivoting(&mut factor, rounds_left);
+            let held = &mut scratch.trial[..m];
+            let (end, by) = self.pivot(&mut work, &mut factor, held, only);
+            if by == Method::ActiveSet {
+                method = by;
             }
-            self.rounds += outcome.rounds;
-            self.pivots += outcome.pivots;
-            if outcome.end == pivoting::End::Budget && only != Some(Method::BlockPivoting) {
-                let pivots_left = self.settings.max_pivots.saturating_sub(self.pivots);
-                let held = &mut scratch.trial[..m];
-                outcome = active_set::solve(&mut work, &mut factor, held, pivots_left);
-                self.pivots += outcome.pivots;
-                method = Method::ActiveSet;
-            }
-            if outcome.end == pivoting::End::Singular {
-                return None;
+            if end == End::Singular {
+                (is_indefinite, certificate_of_best) = (true, None);
+                break;
             }
             // The true gaps, of forces that are not negative.
             if clamp(z) {
@@ -245,19 +228,17 @@ impl<T: Scalar> Run<'_, T> {
             let certificate = certificate::of(problem, z, w);
             let residual = certificate.natural_residual;
             let gained = residual < 0.5 * best.residual;
-            is_best_current = best.offer(z, residual);
-            last_certificate = certificate;
-            if best.residual <= T::GOAL || outcome.end == pivoting::End::Budget || !gained {
+            certificate_of_best = best.offer(z, residual).then_some(certificate);
+            if best.residual <= certificate::GOAL || end == End::Budget || !gained {
                 break;
             }
             scratch.center[..m].copy_from_slice(z);
         }
         if best.residual <= self.settings.tolerance {
-            if is_best_current {
-                self.certificate = Some(last_certificate);
-            } else {
+            if certificate_of_best.is_none() {
                 best.give(problem, z, w);
             }
+            self.certificate = certificate_of_best;
             return Some((Status::Solved, method));
         }
         if may_keep {
@@ -265,30 +246,73 @@ impl<T: Scalar> Run<'_, T> {
             scratch.ldl.forget();
             return self.semidefinite(scratch, only, Start::Cold, z, w);
         }
-        // Forces that run away point along the proof that there is no solution.
+        if is_indefinite {
+            best.give(problem, z, w);
+            return None;
+        }
+        Some(self.unsolved(scratch, only, method, z, w))
+    }
+
+    /// The proof that there is no solution, along which forces run away; without one the best forces seen.
+    fn unsolved(
+        &mut self,
+        scratch: &mut Scratch,
+        only: Option<Method>,
+        method: Method,
+        z: &mut [f64],
+        w: &mut [f64],
+    ) -> (Status, Method) {
+        let problem = self.problem;
+        let m = problem.m();
         let steps = z.iter().zip(&scratch.center);
         for (trial, (&z, &center)) in scratch.trial.iter_mut().zip(steps) {
-            *trial = num_traits::Float::max(z - center, T::zero());
+            *trial = (z - center).max(0.0);
         }
         if proves_no_solution(problem, &scratch.trial[..m]) || proves_no_solution(problem, z) {
-            return Some((self.no_solution(z, w), method));
+            z.fill(0.0);
+            w.copy_from_slice(problem.q());
+            return (Status::NoSolution, method);
         }
-        best.give(problem, z, w);
+        z.copy_from_slice(&scratch.best_z[..m]);
+        dense::gaps_into(problem, z, w);
         match only {
-            None => Some(self.sweep_and_solve(scratch, z, w)),
-            Some(_) => Some((Status::Budget, method)),
+            None => self.sweep_and_solve(scratch, z, w),
+            Some(_) => (Status::Budget, method),
         }
+    }
+
+    /// Block pivoting, and where its budget ends, single pivots; how and by which method it ended. `held`: scratch of m.
+    fn pivot(
+        &mut self,
+        work: &mut Work,
+        factor: &mut Ldl,
+        held: &mut [f64],
+        only: Option<Method>,
+    ) -> (End, Method) {
+        if only != Some(Method::ActiveSet) {
+            let rounds_left = (self.settings.max_rounds + 1).saturating_sub(self.rounds);
+            let outcome = work.block_pivoting(factor, rounds_left);
+            self.rounds += outcome.rounds;
+            self.pivots += outcome.pivots;
+            if outcome.end != End::Budget || only.is_some() {
+                return (outcome.end, Method::BlockPivoting);
+            }
+        }
+        let pivots_left = self.settings.max_pivots.saturating_sub(self.pivots);
+        let outcome = active_set::solve(work, factor, held, pivots_left);
+        self.pivots += outcome.pivots;
+        (outcome.end, Method::ActiveSet)
     }
 
     /// Gauss-Seidel alone.
     fn gauss_seidel(
         &mut self,
-        scratch: &mut Scratch<T>,
-        z: &mut [T],
-        w: &mut [T],
+        scratch: &mut Scratch,
+        z: &mut [f64],
+        w: &mut [f64],
     ) -> (Status, Method) {
         let problem = self.problem;
-        scratch.best_z[..problem.m()].fill(T::zero());
+        scratch.best_z[..problem.m()].fill(0.0);
         self.sweeps += gauss_seidel::sweep(problem, self.settings, z, w);
         let residual = certificate::of(problem, z, w).natural_residual;
         if residual <= self.settings.tolerance {
@@ -301,9 +325,9 @@ impl<T: Scalar> Run<'_, T> {
     /// The last resort: sweeps from the best forces so far, z, then one direct solve on the rows they found.
     fn sweep_and_solve(
         &mut self,
-        scratch: &mut Scratch<T>,
-        z: &mut [T],
-        w: &mut [T],
+        scratch: &mut Scratch,
+        z: &mut [f64],
+        w: &mut [f64],
     ) -> (Status, Method) {
         let problem = self.problem;
         let m = problem.m();
@@ -324,7 +348,7 @@ impl<T: Scalar> Run<'_, T> {
                 w,
             };
             let mut factor = Ldl::new(&mut scratch.dense, &mut scratch.ldl, m);
-            if work.block_pivoting(&mut factor, 1).end == pivoting::End::Singular {
+            if work.block_pivoting(&mut factor, 1).end == End::Singular {
                 break;
             }
             clamp(z);
@@ -343,166 +367,14 @@ impl<T: Scalar> Run<'_, T> {
         };
         (status, Method::GaussSeidel)
     }
-
-    /// Any M: block pivoting if the diagonal is positive, then Lemke.
-    fn general(
-        &mut self,
-        scratch: &mut Scratch<T>,
-        only: Option<Method>,
-        start: Start,
-        is_positive_diagonal: bool,
-        z: &mut [T],
-        w: &mut [T],
-    ) -> (Status, Method) {
-        let problem = self.problem;
-        let m = problem.m();
-        let start = match start {
-            Start::Kept => Start::Cold,
-            start => start,
-        };
-        let mut best = f64::INFINITY;
-        scratch.best_z[..m].fill(T::zero());
-        if is_positive_diagonal {
-            scratch.basis.start(problem, start, &scratch.scale);
-            self.rounds += 1;
-            let rounds_left = (self.settings.max_rounds + 1).saturating_sub(self.rounds);
-            best = self.polish(scratch, f64::INFINITY, rounds_left, z, w);
-            if best <= self.settings.tolerance {
-                z.copy_from_slice(&scratch.best_z[..m]);
-                dense::gaps_into(problem, z, w);
-                return (Status::Solved, Method::BlockPivoting);
-            }
-        }
-        if only.is_some() {
-            z.copy_from_slice(&scratch.best_z[..m]);
-            dense::gaps_into(problem, z, w);
-            return (Status::Budget, Method::BlockPivoting);
-        }
-        self.lemke(scratch, best, z, w)
-    }
-
-    /// Lemke's method; `best`: residual of the forces in `best_z`.
-    fn lemke(
-        &mut self,
-        scratch: &mut Scratch<T>,
-        best: f64,
-        z: &mut [T],
-        w: &mut [T],
-    ) -> (Status, Method) {
-        /// Times m: Lemke's method needs 1 to 3 times m, ten times that is a path of the exponential kind.
-        const PIVOTS_BEFORE_NEW_START: usize = 20;
-
-        let problem = self.problem;
-        let m = problem.m();
-        let mut best = best;
-        if best == f64::INFINITY {
-            scratch.best_z[..m].fill(T::zero());
-        }
-        scratch.ldl.forget();
-        let pivots_left = self.settings.max_pivots.saturating_sub(self.pivots);
-        let first_try = pivots_left.min(PIVOTS_BEFORE_NEW_START * m);
-        let mut run_lemke = |weights, max_pivots| {
-            let memory = lemke::Memory {
-                tableau: &mut scratch.dense[..],
-                integers: &mut scratch.integers[..],
-                scale: &mut scratch.trial[..],
-            };
-            let settings = self.settings;
-            let outcome = lemke::solve(problem, weights, max_pivots, settings, memory, z);
-            self.pivots += outcome.pivots;
-            outcome.end
-        };
-        let mut end = run_lemke(lemke::Weights::Even, first_try);
-        if end == lemke::End::Budget {
-            end = run_lemke(lemke::Weights::Spread, pivots_left - first_try);
-        }
-        if end == lemke::End::Ray && proves_no_solution(problem, z) {
-            return (self.no_solution(z, w), Method::Lemke);
-        }
-        if end == lemke::End::Complementary {
-            // Lemke's own numbers first: its basis may be too ill-conditioned to be solved again.
-            dense::gaps_into(problem, z, w);
-            let residual = certificate::of(problem, z, w).natural_residual;
-            if residual < best {
-                best = residual;
-                scratch.best_z[..m].copy_from_slice(z);
-            }
-            scratch.basis.start_from_forces(z);
-            best = self.polish(scratch, best, 1, z, w);
-        }
-        z.copy_from_slice(&scratch.best_z[..m]);
-        dense::gaps_into(problem, z, w);
-        let status = match end {
-            _ if best <= self.settings.tolerance => Status::Solved,
-            lemke::End::Ray => Status::Ray,
-            _ => Status::Budget,
-        };
-        (status, Method::Lemke)
-    }
-
-    /// Block pivoting by LU from the basis as it stands, refined. `best`: residual of the forces in `best_z`,
-    /// which an improvement replaces. Returns the residual of the better ones.
-    fn polish(
-        &mut self,
-        scratch: &mut Scratch<T>,
-        best: f64,
-        max_rounds: usize,
-        z: &mut [T],
-        w: &mut [T],
-    ) -> f64 {
-        let problem = self.problem;
-        let m = problem.m();
-        let mut best = best;
-        scratch.ldl.forget();
-        for step in 0..3 {
-            let mut work = Work {
-                problem,
-                settings: self.settings,
-                scale: &scratch.scale[..m],
-                unit: scratch.unit,
-                center: (step > 0).then_some(&scratch.center[..m]),
-                basis: &mut scratch.basis,
-                z,
-                w,
-            };
-            let rounds = if step == 0 { max_rounds } else { 0 };
-            let mut factor = Lu::new(&mut scratch.dense, &mut scratch.lu_rows);
-            let outcome = work.block_pivoting(&mut factor, rounds);
-            self.rounds += outcome.rounds;
-            self.pivots += outcome.pivots;
-            if outcome.end == pivoting::End::Singular {
-                break;
-            }
-            if clamp(z) {
-                dense::gaps_into(problem, z, w);
-            }
-            let residual = certificate::of(problem, z, w).natural_residual;
-            if residual >= best {
-                break;
-            }
-            best = residual;
-            scratch.best_z[..m].copy_from_slice(z);
-            if best <= T::GOAL {
-                break;
-            }
-            scratch.center[..m].copy_from_slice(z);
-        }
-        best
-    }
-
-    fn no_solution(&self, z: &mut [T], w: &mut [T]) -> Status {
-        z.fill(T::zero());
-        w.copy_from_slice(self.problem.q());
-        Status::NoSolution
-    }
 }
 
 /// Sets negative forces to zero; whether there were any. NaN becomes zero as well.
-fn clamp<T: Scalar>(z: &mut [T]) -> bool {
+fn clamp(z: &mut [f64]) -> bool {
     let mut has_changed = false;
     for z in z {
-        if *z < T::zero() || z.is_nan() {
-            *z = T::zero();
+        if *z < 0.0 || z.is_nan() {
+            *z = 0.0;
             has_changed = true;
         }
     }

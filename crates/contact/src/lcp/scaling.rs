@@ -1,16 +1,14 @@
 //! Sizes of the rows, so that tolerances mean the same in every row and in every unit system.
 
-use super::{Problem, Scalar};
+use super::Problem;
 
 /// What the diagonal says about M.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Diagonal<T> {
+pub(super) struct Diagonal {
     /// The power of two below the largest M_ii: scale_i² unit = M_ii.
-    pub(super) unit: T,
-    /// All M_ii > 0.
-    pub(super) is_positive_diagonal: bool,
-    /// All M_ii ≥ 0 and rows with M_ii = 0 are zero: necessary for symmetric positive semi-definite M.
-    pub(super) is_semidefinite_diagonal: bool,
+    pub(super) unit: f64,
+    /// All M_ii ≥ 0 and rows with M_ii = 0 are zero: necessary for positive semi-definite M.
+    pub(super) may_be_semidefinite: bool,
 }
 
 /// `scale`_i = sqrt(M_ii / 2^e), with 2^e the power of two below the largest diagonal entry; 1 for rows without a diagonal.
@@ -18,48 +16,42 @@ pub(super) struct Diagonal<T> {
 /// With D = diag(scale)⁻¹ the matrix D M D has a unit diagonal (up to 2^e), w_i / scale_i and z_i scale_i
 /// compare between rows. The matrix itself is not copied: its factorisation uses no square roots,
 /// so that scaling by powers of two would not change a bit of it.
-pub(super) fn row_scale_into<T: Scalar>(problem: &Problem<T>, scale: &mut [T]) -> Diagonal<T> {
+pub(super) fn row_scale_into(problem: &Problem, scale: &mut [f64]) -> Diagonal {
     let m = problem.m();
     let scale = &mut scale[..m];
-    let mut largest = T::zero();
-    let mut is_positive_diagonal = true;
+    let mut largest = 0.0_f64;
     for (i, scale) in scale.iter_mut().enumerate() {
-        let diagonal = problem.diagonal(i);
-        *scale = diagonal;
-        is_positive_diagonal &= diagonal > T::zero();
-        largest = num_traits::Float::max(largest, diagonal);
+        *scale = problem.diagonal(i);
+        largest = largest.max(*scale);
     }
     let unit = power_of_two_below(largest);
-    let mut kind = Diagonal {
-        unit,
-        is_positive_diagonal,
-        is_semidefinite_diagonal: true,
-    };
-    if !is_positive_diagonal {
-        for (i, scale) in scale.iter_mut().enumerate() {
-            if *scale <= T::zero() {
-                let is_zero_row = || problem.column(i).iter().all(|&entry| entry == T::zero());
-                kind.is_semidefinite_diagonal &= *scale == T::zero() && is_zero_row();
-                *scale = unit;
-            }
+    let mut may_be_semidefinite = true;
+    for (i, scale) in scale.iter_mut().enumerate() {
+        if *scale <= 0.0 {
+            let is_zero_row = || problem.column(i).iter().all(|&entry| entry == 0.0);
+            may_be_semidefinite &= *scale == 0.0 && is_zero_row();
+            *scale = unit;
         }
     }
     // Exact, as the unit is a power of two.
-    let per_unit = T::one() / unit;
+    let per_unit = 1.0 / unit;
     for scale in scale.iter_mut() {
-        *scale = num_traits::Float::sqrt(*scale * per_unit);
+        *scale = (*scale * per_unit).sqrt();
     }
-    kind
+    Diagonal {
+        unit,
+        may_be_semidefinite,
+    }
 }
 
 /// Largest 2^e ≤ x, so that x / 2^e is exact and in [1, 2). 1 for x = 0.
-fn power_of_two_below<T: Scalar>(x: T) -> T {
+fn power_of_two_below(x: f64) -> f64 {
     // Where 1 / 2^e would not be a normal number any more, 1 serves as well.
-    let range = T::min_positive_value()..=T::one() / T::min_positive_value();
+    let range = f64::MIN_POSITIVE..=1.0 / f64::MIN_POSITIVE;
     if !range.contains(&x) {
-        return T::one();
+        return 1.0;
     }
-    T::of(f64::from_bits(x.wide().to_bits() & (0x7ff << 52)))
+    f64::from_bits(x.to_bits() & (0x7ff << 52))
 }
 
 #[cfg(test)]
@@ -85,14 +77,14 @@ mod tests {
     fn diagonal_finds_what_cannot_be_semidefinite() {
         let q = [-1.0; 2];
         let mut scale = [0.0; 2];
-        let mut kind = |matrix: [f64; 4]| {
-            let kind = row_scale_into(&Problem::new(&matrix, &q).unwrap(), &mut scale);
-            (kind.is_positive_diagonal, kind.is_semidefinite_diagonal)
+        let mut may_be = |matrix: [f64; 4]| {
+            let problem = Problem::new(&matrix, &q).unwrap();
+            row_scale_into(&problem, &mut scale).may_be_semidefinite
         };
-        assert_eq!(kind([1.0, 0.0, 0.0, 1.0]), (true, true));
-        assert_eq!(kind([1.0, 0.0, 0.0, 0.0]), (false, true));
-        assert_eq!(kind([1.0, 0.5, 0.5, 0.0]), (false, false));
-        assert_eq!(kind([1.0, 0.0, 0.0, -1.0]), (false, false));
+        assert!(may_be([1.0, 0.0, 0.0, 1.0]));
+        assert!(may_be([1.0, 0.0, 0.0, 0.0]));
+        assert!(!may_be([1.0, 0.5, 0.5, 0.0]));
+        assert!(!may_be([1.0, 0.0, 0.0, -1.0]));
     }
 
     #[test]

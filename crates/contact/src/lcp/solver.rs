@@ -1,18 +1,18 @@
 //! The methods by name, behind one trait.
 
-use super::run::Request;
-use super::{Method, Problem, Scalar, Scratch, Settings, Solution, Start};
+use super::run::{self, Request};
+use super::{Method, Problem, Scratch, Settings, Solution, Start};
 use crate::error::Error;
 
-/// A method for linear complementarity problems.
+/// A method for linear complementarity problems with a symmetric positive semi-definite M.
 ///
 /// ```
-/// use contact::lcp::{ActiveSet, BlockPivoting, Lemke, Problem, Scratch, Settings, Solver, Start};
+/// use contact::lcp::{ActiveSet, Automatic, BlockPivoting, Problem, Scratch, Settings, Solver, Start};
 ///
 /// # fn main() -> Result<(), contact::Error> {
 /// let problem = Problem::symmetric(&[2.0, 1.0, 1.0, 2.0], &[-1.0, 0.2])?;
 /// let mut scratch = Scratch::new(2);
-/// let methods: [&dyn Solver<f64>; 3] = [&BlockPivoting, &ActiveSet, &Lemke];
+/// let methods: [&dyn Solver; 3] = [&Automatic, &BlockPivoting, &ActiveSet];
 /// for method in methods {
 ///     let (mut z, mut w) = ([0.0; 2], [0.0; 2]);
 ///     method.solve(&problem, &Settings::default(), &mut scratch, Start::Cold, &mut z, &mut w)?;
@@ -21,7 +21,7 @@ use crate::error::Error;
 /// # Ok(())
 /// # }
 /// ```
-pub trait Solver<T: Scalar> {
+pub trait Solver {
     /// What it is called in tables.
     fn name(&self) -> &'static str;
 
@@ -30,16 +30,15 @@ pub trait Solver<T: Scalar> {
     /// Does not allocate, lock or log.
     ///
     /// # Errors
-    /// [`Error::Capacity`]; [`Error::Length`] if the start, `z` or `w` do not have m entries;
-    /// [`Error::NotSymmetric`] from methods for symmetric M.
+    /// [`Error::NotSymmetric`]; [`Error::Capacity`]; [`Error::Length`] if the start, `z` or `w` do not have m entries.
     fn solve(
         &self,
-        problem: &Problem<T>,
+        problem: &Problem,
         settings: &Settings,
-        scratch: &mut Scratch<T>,
+        scratch: &mut Scratch,
         start: Start,
-        z: &mut [T],
-        w: &mut [T],
+        z: &mut [f64],
+        w: &mut [f64],
     ) -> Result<Solution, Error>;
 }
 
@@ -51,33 +50,29 @@ pub struct Automatic;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct BlockPivoting;
 
-/// Single pivots, downhill in energy. Symmetric positive semidefinite M; starts from no force, whatever the start.
+/// Single pivots, downhill in energy; starts from no force, whatever the start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ActiveSet;
 
-/// Lemke's method with the lexicographic rule. Any M; has no use for a warm start.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Lemke;
-
-/// Projected Gauss-Seidel sweeps from no force. Symmetric positive semidefinite M.
+/// Projected Gauss-Seidel sweeps from no force, whatever the start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct GaussSeidel;
 
 macro_rules! solver {
     ($type:ident, $name:literal, $only:expr) => {
-        impl<T: Scalar> Solver<T> for $type {
+        impl Solver for $type {
             fn name(&self) -> &'static str {
                 $name
             }
 
             fn solve(
                 &self,
-                problem: &Problem<T>,
+                problem: &Problem,
                 settings: &Settings,
-                scratch: &mut Scratch<T>,
+                scratch: &mut Scratch,
                 start: Start,
-                z: &mut [T],
-                w: &mut [T],
+                z: &mut [f64],
+                w: &mut [f64],
             ) -> Result<Solution, Error> {
                 let mut request = Request {
                     problem,
@@ -85,7 +80,7 @@ macro_rules! solver {
                     scratch,
                     only: $only,
                 };
-                T::solve(&mut request, start, z, w)
+                run::solve(&mut request, start, z, w)
             }
         }
     };
@@ -94,5 +89,4 @@ macro_rules! solver {
 solver!(Automatic, "automatic", None);
 solver!(BlockPivoting, "block pivoting", Some(Method::BlockPivoting));
 solver!(ActiveSet, "active set", Some(Method::ActiveSet));
-solver!(Lemke, "Lemke", Some(Method::Lemke));
 solver!(GaussSeidel, "Gauss-Seidel", Some(Method::GaussSeidel));

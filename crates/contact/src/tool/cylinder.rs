@@ -39,7 +39,8 @@ impl Cylinder {
     /// On the axis the normal is +x; inside, where mantle and end are equally near, the mantle's.
     pub(super) fn signed_distance_local(&self, point: DVec3) -> ContactPoint {
         let across = DVec3::new(point.x, point.y, 0.0);
-        let from_axis = point.x.hypot(point.y);
+        // Not `hypot`, which is as dear as all the rest: radii whose squares are no numbers are no radii.
+        let from_axis = (point.x * point.x + point.y * point.y).sqrt();
         let radial = unit_or(across, from_axis, DVec3::X);
         let mantle = from_axis - self.radius;
         let mantle_contact = ContactPoint {

@@ -151,7 +151,7 @@ fn write_cases(dir: &Path) {
         fs::write(case.join("mesh.msh"), mesh()).unwrap();
         fs::write(case.join("path.csv"), "axis_y_m,force\n0.004,0\n0.005,1\n").unwrap();
     }
-    copy(&root().join("tests/cases/lcp/murty-16"), &dir.join("lcp"));
+    copy(&root().join("tests/cases/lcp/fathi-16"), &dir.join("lcp"));
     write_sequence(&dir.join("sequence"));
 }
 

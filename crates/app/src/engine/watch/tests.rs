@@ -1,9 +1,11 @@
 //! No candidate that is near is ever missed, whatever moves; and those that are far are spared.
 
+use contact::Place;
 use contact::tool::{BoxShape, Sphere};
 use glam::{DMat3, DQuat};
 
 use super::super::ActiveContact;
+use super::super::forces::Loads;
 use super::super::pairs::Pairs;
 use super::*;
 
@@ -59,6 +61,15 @@ fn part(rest: &[DVec3]) -> ContactPart {
     ContactPart::new(rest.to_vec(), n, blocks)
 }
 
+fn loads_of(active: &[ActiveContact], n_candidates: usize) -> Loads {
+    let mut loads = Loads::new(n_candidates);
+    for contact in active {
+        let place = Place::node(contact.candidate, DVec3::ZERO);
+        loads.add(&place, 1.0, contact.force_on_part);
+    }
+    loads
+}
+
 /// Forces that come, change, wander to a neighbour and go; few at a time.
 struct Forces(Vec<DVec3>);
 
@@ -83,20 +94,19 @@ impl Forces {
         }
     }
 
-    fn active(&self) -> (Vec<ActiveContact>, Vec<bool>) {
+    fn active(&self) -> Vec<ActiveContact> {
         let loaded = self
             .0
             .iter()
             .enumerate()
             .filter(|(_, f)| **f != DVec3::ZERO);
-        let active = loaded
+        loaded
             .map(|(k, force)| ActiveContact {
                 candidate: k as u32,
                 normal_force: force.length(),
                 force_on_part: *force,
             })
-            .collect();
-        (active, self.0.iter().map(|f| *f != DVec3::ZERO).collect())
+            .collect()
     }
 }
 
@@ -158,7 +168,8 @@ fn walk(tool: &Tool, n: usize, steps: usize, force: f64) -> Seen {
             forces.change(force, &mut random);
         }
         let pose = DPose3::from_parts(at, DQuat::from_scaled_axis(turn));
-        let (active, is_active) = forces.active();
+        let active = forces.active();
+        let loads = loads_of(&active, part.n_candidates());
         let deformed = Deformed {
             part: &part,
             active: &active,
@@ -168,7 +179,7 @@ fn walk(tool: &Tool, n: usize, steps: usize, force: f64) -> Seen {
             deformed,
             tool,
             tool_pose: &pose,
-            is_active: &is_active,
+            loads: &loads,
         };
         look(&mut watch, state, &mut seen);
     }
@@ -218,8 +229,7 @@ fn after_a_force_that_is_no_number_all_is_looked_at_anew() {
             normal_force: 1.0,
             force_on_part: force,
         }];
-        let mut is_active = vec![false; rest.len()];
-        is_active[200] = true;
+        let loads = loads_of(&active, rest.len());
         let pose = DPose3::from_translation(DVec3::new(8e-3 - 2e-4 * f64::from(step), 0.0, 4e-3));
         let state = State {
             deformed: Deformed {
@@ -229,7 +239,7 @@ fn after_a_force_that_is_no_number_all_is_looked_at_anew() {
             },
             tool: &tool,
             tool_pose: &pose,
-            is_active: &is_active,
+            loads: &loads,
         };
         if is_bad {
             watch.advance(state);

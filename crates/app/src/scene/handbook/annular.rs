@@ -25,7 +25,9 @@
 //! superposition of end conditioning forces); Timoshenko and Woinowsky-Krieger, "Theory of Plates and
 //! Shells", 1959, section 114 (a wall under a load round its axis is such a beam).
 
-use super::{Measured, Predicted, Prediction, leaves_ramp};
+use super::{Measured, Predicted, Prediction, Section, leaves_ramp};
+use crate::scene::check::Range::NotNegative;
+use crate::scene::{Material, SceneError};
 
 /// Dimensions of a round wall with a bead, and of the spigot's bead, which has the ramps.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,6 +60,38 @@ enum Way {
 }
 
 impl Annular {
+    pub(super) fn checked(section: &Section<'_>, material: &Material) -> Result<Self, SceneError> {
+        let (keys, check) = (section.keys, section.check);
+        let lead = section.required("lead_angle_deg", keys.lead_angle_deg)?;
+        let back = keys.return_angle_deg;
+        let cap = Self {
+            diameter: section.length("diameter", keys.diameter)?,
+            thickness: section.thickness()?,
+            undercut: section.length("undercut", keys.undercut)?,
+            bead_height: check.number_or("bead_height", keys.bead_height, 0.0, NotNegative)?,
+            from_end: check.number_or("from_end", keys.from_end, 0.0, NotNegative)?,
+            lead_angle_deg: section.slope("lead_angle_deg", lead)?,
+            return_angle_deg: back
+                .map(|back| section.slope("return_angle_deg", back))
+                .transpose()?,
+            edge_radius: section.edge_radius()?,
+            share: section.share()?,
+        };
+        if let Some(bead) = keys.bead_height
+            && cap.bead_height >= 0.5 * cap.diameter
+        {
+            let what = format!("bead_height {} fills the wall's inside", bead.value.0);
+            let mend = "it counts from the wall's inside to the bead's crest";
+            return Err(check.error(bead.offset, what, mend));
+        }
+        if cap.is_locked(material.poisson_ratio) {
+            let what = format!("a ramp of {} degrees closes this bead", cap.lead_angle_deg);
+            let mend = "the formula has no answer for so high a bead on so steep a ramp: lower one of them";
+            return Err(check.error(lead.offset, what, mend));
+        }
+        Ok(cap)
+    }
+
     /// The handbook's peak force for a bead at the wall's open end, N.
     pub fn handbook_force(&self, young_modulus: f64, poisson_ratio: f64) -> f64 {
         let ratio = 1.0 + 2.0 * self.thickness / self.diameter;

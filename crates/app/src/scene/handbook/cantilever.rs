@@ -11,7 +11,9 @@
 //! Source: Covestro (formerly Bayer MaterialScience), "Snap-Fit Joints for Plastics: A Design
 //! Guide", cantilever snap joints of rectangular constant cross-section.
 
-use super::{Measured, Predicted, Prediction, leaves_ramp};
+use super::{Measured, Predicted, Prediction, Section, leaves_ramp};
+use crate::scene::SceneError;
+use crate::scene::check::Range::NotNegative;
 
 /// Dimensions of a plain cantilever hook.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,6 +52,35 @@ pub enum Ramp {
 }
 
 impl Cantilever {
+    pub(super) fn checked(section: &Section<'_>) -> Result<Self, SceneError> {
+        let (keys, check) = (section.keys, section.check);
+        let angle = section.required("lead_angle_deg", keys.lead_angle_deg)?;
+        let arm = Self {
+            length: section.length("length", keys.length)?,
+            thickness: section.thickness()?,
+            width: section.length("width", keys.width)?,
+            undercut: section.length("undercut", keys.undercut)?,
+            lead_angle_deg: section.slope("lead_angle_deg", angle)?,
+            friction: check.number_or("friction", keys.friction, 0.0, NotNegative)?,
+            arms: match keys.arms {
+                Some(arms) => check.whole("arms", arms)?,
+                None => 1,
+            },
+            ramp: keys.ramp.map_or_else(Ramp::default, |at| at.value),
+            edge_radius: section.edge_radius()?,
+            share: section.share()?,
+        };
+        if let Some(friction) = keys.friction.filter(|_| arm.is_locked()) {
+            let what = format!(
+                "friction {} locks a ramp of {} degrees",
+                arm.friction, arm.lead_angle_deg
+            );
+            let mend = "friction times tan(lead angle) must be below 1";
+            return Err(check.error(friction.offset, what, mend));
+        }
+        Ok(arm)
+    }
+
     /// Largest strain when the arm is bent by the undercut.
     pub fn strain(&self) -> f64 {
         1.5 * self.thickness * self.undercut / (self.length * self.length)

@@ -19,7 +19,9 @@
 
 use std::f64::consts::PI;
 
-use super::{Measured, Predicted, Prediction};
+use super::{Measured, Predicted, Prediction, Section};
+use crate::scene::SceneError;
+use crate::scene::check::Range::{NotNegative, Positive};
 
 /// Dimensions of a ring with an opening, and of the bar.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,6 +53,45 @@ struct Place {
 }
 
 impl Ring {
+    pub(super) fn checked(section: &Section<'_>) -> Result<Self, SceneError> {
+        let (keys, check) = (section.keys, section.check);
+        let opening = section.required("opening_deg", keys.opening_deg)?;
+        let rod = keys.rod_radius.or(section.tool.cylinder_radius());
+        let rod = section.required("rod_radius", rod)?;
+        let root = keys.root_angle_deg;
+        let ring = Self {
+            radius: section.length("radius", keys.radius)?,
+            thickness: section.thickness()?,
+            width: section.length("width", keys.width)?,
+            opening_deg: check.number("opening_deg", opening, Positive)?,
+            root_angle_deg: check.number_or("root_angle_deg", root, 0.0, NotNegative)?,
+            rod_radius: check.number("rod_radius", rod, Positive)?,
+            share: section.share()?,
+        };
+        if ring.opening_deg > 180.0 {
+            let what = format!(
+                "opening_deg {} is more than half of the ring",
+                ring.opening_deg
+            );
+            let mend = "write 180 or less: a ring that is more open holds nothing";
+            return Err(check.error(opening.offset, what, mend));
+        }
+        let lip = 180.0 - 0.5 * ring.opening_deg;
+        if let Some(root) = root.filter(|_| ring.root_angle_deg >= lip) {
+            let what = format!(
+                "root_angle_deg {} leaves no arm before the lip at {lip}",
+                ring.root_angle_deg
+            );
+            return Err(check.error(root.offset, what, "both count from the foot's middle"));
+        }
+        if ring.rod_radius <= ring.half_opening() {
+            let what = format!("rod_radius {} passes the opening untouched", rod.value.0);
+            let mend = "radius sin(opening_deg / 2) must be below it";
+            return Err(check.error(rod.offset, what, mend));
+        }
+        Ok(ring)
+    }
+
     fn lip(&self) -> (f64, f64) {
         let half = 0.5 * self.opening_deg.to_radians();
         (self.radius * half.sin(), self.radius * half.cos())

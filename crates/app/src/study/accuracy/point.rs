@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::choice::SOFTWARE;
 use crate::report::plot::short;
 use crate::scene::{
-    Accuracy, Adaptive, ContactIterations, FreeNodes, Multiply, MultiplyScalar, Preset,
+    Accuracy, Adaptive, ContactAt, ContactIterations, FreeNodes, Multiply, MultiplyScalar, Preset,
     QuadratureRule, Rates, Scalar, Scene,
 };
 
@@ -18,6 +18,8 @@ pub enum Axis {
     Interior,
     /// Mesh of the scene, others, and the scene's refined.
     Mesh,
+    /// Where contact acts.
+    Contact,
     /// Passes over the contact planes.
     Planes,
     /// Which interface nodes are free, forces of the full order.
@@ -38,10 +40,11 @@ pub enum Axis {
 
 impl Axis {
     /// All, in the order of the tables.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Order,
         Self::Interior,
         Self::Mesh,
+        Self::Contact,
         Self::Planes,
         Self::Select,
         Self::MaxContacts,
@@ -58,6 +61,7 @@ impl Axis {
             Self::Order => "order",
             Self::Interior => "interior",
             Self::Mesh => "mesh",
+            Self::Contact => "contact",
             Self::Planes => "planes",
             Self::Select => "select",
             Self::MaxContacts => "contacts",
@@ -75,6 +79,7 @@ impl Axis {
             Self::Order => "order of the elements",
             Self::Interior => "order inside (surface and contact as they are)",
             Self::Mesh => "mesh",
+            Self::Contact => "contact at nodes or at places that move",
             Self::Planes => "passes over the contact planes",
             Self::Select => "p-method: select (free nodes drawn)",
             Self::MaxContacts => "contacts kept",
@@ -229,6 +234,11 @@ pub(super) fn points(
                 }
                 let refined = format!("{}, each element in eight", name_of(&scene.part.mesh));
                 add(refined, &|s| s.refinements = 1);
+            }
+            Axis::Contact => {
+                for (label, at) in [("nodes", ContactAt::Nodes), ("places", ContactAt::Places)] {
+                    add(label.to_owned(), &|s| s.scene.accuracy.contact_at = at);
+                }
             }
             Axis::Planes => {
                 for times in [1, 2, 3, 5] {

@@ -18,7 +18,7 @@ use serde_json::{Map, Value, json};
 use super::case::{Case, RawPose};
 use super::elastic_case::Elastic;
 use super::{Failure, Outcome, Quantity};
-use crate::engine::{ContactIterations, ContactPart, Engine, EngineSettings, StepReport};
+use crate::engine::{ContactIterations, ContactPart, Engine, EngineSettings, Plan, StepReport};
 use crate::progress::Ui;
 
 /// m. As the reference: planes stand still when no displacement changes by more.
@@ -192,8 +192,8 @@ fn engine(
         lcp: lcp::Settings::default(),
         max_stride: f64::INFINITY,
     };
-    Engine::new(ready.part.clone(), ready.tool.clone(), None, settings)
-        .map_err(|e| Failure::Error(e.to_string()))
+    let plan = Plan::new(ready.part.clone(), ready.tool.clone(), None, settings);
+    Engine::new(plan).map_err(|e| Failure::Error(e.to_string()))
 }
 
 /// Walks the tool in from where it is free, which picks the branch, and reports the equilibrium.

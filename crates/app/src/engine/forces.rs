@@ -1,0 +1,211 @@
+//! The state between passes and steps: the forces on the part's nodes, and what the nodes do under them.
+
+use contact::{Contact, Place};
+use glam::DVec3;
+
+use super::pairs::Pairs;
+use super::part::Deformed;
+use super::{ActiveContact, ContactPart};
+
+/// Nodes whose compliance blocks are kept side by side: 42 MB of them, touched only as far as they are used.
+const MOST_PAIRS: usize = 768;
+
+/// No place in the list of loaded nodes.
+const NONE: u32 = u32::MAX;
+
+/// Forces on nodes, each node once.
+#[derive(Debug)]
+pub(super) struct Loads {
+    pub(super) active: Vec<ActiveContact>,
+    /// By candidate: its place in `active`.
+    place_of: Vec<u32>,
+}
+
+impl Loads {
+    pub(super) fn new(n_candidates: usize) -> Self {
+        Self {
+            active: Vec::with_capacity(n_candidates),
+            place_of: vec![NONE; n_candidates],
+        }
+    }
+
+    pub(super) fn clear(&mut self) {
+        for contact in self.active.drain(..) {
+            self.place_of[contact.candidate as usize] = NONE;
+        }
+    }
+
+    /// Adds a normal force (N) at a place.
+    #[inline]
+    pub(super) fn add(&mut self, place: &Place, normal_force: f64, normal: DVec3) {
+        for &(candidate, share) in place.shares() {
+            let force = share * normal_force;
+            self.load(candidate, force, force * normal);
+        }
+    }
+
+    /// Adds to what a node carries, N.
+    #[inline]
+    fn load(&mut self, candidate: u32, normal_force: f64, on_part: DVec3) {
+        let place = &mut self.place_of[candidate as usize];
+        if let Some(contact) = self.active.get_mut(*place as usize) {
+            contact.normal_force += normal_force;
+            contact.force_on_part += on_part;
+            return;
+        }
+        *place = self.active.len() as u32;
+        self.active.push(ActiveContact {
+            candidate,
+            normal_force,
+            force_on_part: on_part,
+        });
+    }
+
+    #[inline]
+    pub(super) fn is_loaded(&self, candidate: u32) -> bool {
+        self.place_of[candidate as usize] != NONE
+    }
+}
+
+/// Forces on the part, by node and by contact.
+#[derive(Debug)]
+pub(super) struct Forces {
+    loads: Loads,
+    /// Keys and normal forces (N) of the contacts that carry some, and by key whether it does.
+    carried: Vec<(u32, f64)>,
+    is_carried: Vec<bool>,
+    /// Their places, by number.
+    carried_at: Vec<u32>,
+    /// Displacement of nodes, as far as it is known.
+    known: Known,
+    /// Compliance between nodes that are or were near.
+    pub(super) pairs: Pairs,
+}
+
+impl Forces {
+    /// `n_keys`: keys that contacts can have; `max_near`: places of contacts at most.
+    pub(super) fn new(n_candidates: usize, n_keys: usize, max_near: usize) -> Self {
+        Self {
+            loads: Loads::new(n_candidates),
+            carried: Vec::with_capacity(max_near),
+            is_carried: vec![false; n_keys],
+            carried_at: Vec::with_capacity(max_near),
+            known: Known::new(n_candidates),
+            pairs: Pairs::new(n_candidates, n_candidates.min(2 * max_near).min(MOST_PAIRS)),
+        }
+    }
+
+    /// No force, nothing known.
+    pub(super) fn clear(&mut self) {
+        self.forget();
+        self.pairs.reset();
+    }
+
+    fn forget(&mut self) {
+        self.loads.clear();
+        self.carried_at.clear();
+        for (key, _) in self.carried.drain(..) {
+            self.is_carried[key as usize] = false;
+        }
+        self.known.forget();
+    }
+
+    /// Makes the normal forces of these contacts (N) the state. Does not allocate.
+    pub(super) fn adopt(&mut self, places: &[Place], contacts: &[Contact], normal_forces: &[f64]) {
+        self.forget();
+        for (contact, &force) in contacts.iter().zip(normal_forces) {
+            if force > 0.0 {
+                let place = &places[contact.place as usize];
+                self.is_carried[place.key as usize] = true;
+                self.carried.push((place.key, force));
+                self.carried_at.push(contact.place);
+                self.loads.add(place, force, contact.normal);
+            }
+        }
+    }
+
+    /// Nodes that carry force, each once.
+    pub(super) fn active(&self) -> &[ActiveContact] {
+        &self.loads.active
+    }
+
+    pub(super) fn loads(&self) -> &Loads {
+        &self.loads
+    }
+
+    /// Keys and normal forces (N) of the contacts that carry some.
+    pub(super) fn carried(&self) -> &[(u32, f64)] {
+        &self.carried
+    }
+
+    /// Places of the contacts that carry force, by their number in the last pass.
+    pub(super) fn carried_at(&self) -> &[u32] {
+        &self.carried_at
+    }
+
+    #[inline]
+    pub(super) fn is_carried(&self, key: u32) -> bool {
+        self.is_carried[key as usize]
+    }
+
+    pub(super) fn deformed<'a>(&'a self, part: &'a ContactPart) -> Deformed<'a> {
+        Deformed {
+            part,
+            active: &self.loads.active,
+            pairs: &self.pairs,
+        }
+    }
+
+    /// Displacement of a candidate, m; summed once for each state.
+    #[inline]
+    pub(super) fn displacement(&mut self, part: &ContactPart, candidate: u32) -> DVec3 {
+        let i = candidate as usize;
+        if let Some(known) = self.known.get(i) {
+            return known;
+        }
+        let displacement = self.deformed(part).displacement(i);
+        self.known.set(i, displacement);
+        displacement
+    }
+
+    /// Where a candidate is, m.
+    #[inline]
+    pub(super) fn position(&mut self, part: &ContactPart, candidate: u32) -> DVec3 {
+        part.rest_positions()[candidate as usize] + self.displacement(part, candidate)
+    }
+}
+
+/// Displacements that need not be summed again until the forces change.
+#[derive(Debug)]
+struct Known {
+    /// By candidate, m.
+    displacement: Vec<DVec3>,
+    /// By candidate: the state its displacement belongs to.
+    state_of: Vec<u64>,
+    state: u64,
+}
+
+impl Known {
+    fn new(n_candidates: usize) -> Self {
+        Self {
+            displacement: vec![DVec3::ZERO; n_candidates],
+            state_of: vec![0; n_candidates],
+            state: 1,
+        }
+    }
+
+    /// The forces have changed.
+    fn forget(&mut self) {
+        self.state += 1;
+    }
+
+    fn set(&mut self, candidate: usize, displacement: DVec3) {
+        self.displacement[candidate] = displacement;
+        self.state_of[candidate] = self.state;
+    }
+
+    #[inline]
+    fn get(&self, candidate: usize) -> Option<DVec3> {
+        (self.state_of[candidate] == self.state).then(|| self.displacement[candidate])
+    }
+}

@@ -11,7 +11,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use device::Wrench;
 use glamx::DPose3;
 use snapin::engine::StepReport;
-use snapin::scene::{Adaptive, Columns, FreeNodes, Multiply, Scalar, Scene};
+use snapin::prepare::PreparedPart;
+use snapin::scene::{Adaptive, Columns, ContactAt, FreeNodes, Multiply, Scalar, Scene};
 use snapin::session::fast::FastSettings;
 use snapin::session::slow::Stepped;
 use snapin::setup;
@@ -51,7 +52,7 @@ fn nothing_in_the_haptic_loop_allocates() {
 }
 
 /// All scenes, pushed in and pulled out again, a jump of the handle and a pose that is refused; the
-/// clip also with 32-bit numbers, with most of its columns missing, and with its shape drawn from free nodes; and with fewer rows than nodes come near.
+/// clip also with 32-bit numbers, with most of its columns missing, and with its shape drawn from free nodes; and with fewer rows than contacts come near, of nodes and of the tool's edges.
 fn no_step_of_an_insertion_allocates() {
     let all = (Columns::All, Scalar::F64);
     let bent = Adaptive::On(FreeNodes::Indicator(1e-3));
@@ -73,6 +74,7 @@ fn no_step_of_an_insertion_allocates() {
         ("edge.toml", Adaptive::Off, all, None),
         ("clip.toml", bent, all, None),
         ("clip.toml", Adaptive::Off, all, Some(3)),
+        ("edge.toml", Adaptive::Off, all, Some(1)),
     ] {
         let mut scene = Scene::load(&root().join("scenes").join(name)).unwrap();
         scene.accuracy.adaptive = adaptive;
@@ -121,8 +123,17 @@ fn no_step_of_an_insertion_allocates() {
 /// The fast loop of two rates, with the engine's work in turns: solving, hand-overs and freezing take no memory.
 fn no_tick_of_two_rates_allocates() {
     let (scene, prepared) = shipped("clip.toml");
-    let (tool, _) = setup::tool(&scene).unwrap();
-    let mut engine = setup::engine(&scene, &prepared, tool).unwrap();
+    no_tick_allocates(&scene, &prepared);
+    let (mut scene, prepared) = shipped("clip.toml");
+    scene.accuracy.contact_at = ContactAt::Places;
+    no_tick_allocates(&scene, &prepared);
+    let (scene, prepared) = shipped("edge.toml");
+    no_tick_allocates(&scene, &prepared);
+}
+
+fn no_tick_allocates(scene: &Scene, prepared: &PreparedPart) {
+    let (tool, _) = setup::tool(scene).unwrap();
+    let mut engine = setup::engine(scene, prepared, tool).unwrap();
     let start = scene.tool.pose_part_tool;
     let at = |share: f64| DPose3 {
         translation: start.translation + share * scene.drive.travel * scene.drive.direction,

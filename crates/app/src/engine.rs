@@ -61,10 +61,6 @@ use standing::Standing;
 /// Nearby states need 3 to 7; more than 60 means that two sets of planes alternate.
 const MAX_PASSES: u32 = 60;
 
-/// Of the near distance, a motion of the places since the last look after which others may have come near: those that were
-/// not, were farther, and move some times as much at most.
-const LOOK_SHARE: f64 = 0.1;
-
 /// Passes in all strides of one step together: a step is bounded in time, and its answer flagged where that is not enough.
 const MOST_PASSES_OF_STEP: u32 = 4 * MAX_PASSES;
 
@@ -89,8 +85,6 @@ pub struct Engine {
     last_target: Option<DPose3>,
     /// Deviation of the tool from its target: position (m) and rotation vector (rad).
     deviation: [f64; 6],
-    /// On the tool, from the contacts, at the end of the last stride.
-    last_wrench: [f64; 6],
     /// m, point of the tool's rows in the last pass.
     reference: DVec3,
 }
@@ -159,7 +153,6 @@ impl Engine {
         self.near.reset();
         self.last_target = None;
         self.deviation = [0.0; 6];
-        self.last_wrench = [0.0; 6];
         if let Some(late) = &mut self.late {
             late.clear();
         }
@@ -238,20 +231,13 @@ impl Engine {
         let deepest_before = report.rigid_depth;
         let mut tool_pose = self.held.pose(target, &self.deviation);
         let mut standing = Standing::new(self.settings.near_distance, tolerance);
-        // m, of places and tool since the last look.
-        let mut moved = f64::INFINITY;
         let mut seeks_again = self.has_moving_places();
         let mut rounds = 0;
         let mut clock = StageClock::start();
         while report.passes < max_passes {
             report.passes += 1;
             self.reference = self.held.reference(target, &self.deviation);
-            if moved > LOOK_SHARE * self.settings.near_distance || self.has_features() {
-                self.look(&tool_pose, report);
-                moved = 0.0;
-            } else {
-                self.places.begin_pass();
-            }
+            self.look(&tool_pose, report);
             clock.lap(Stage::Proximity, report);
             self.draw(&tool_pose, report);
             clock.lap(Stage::Planes, report);
@@ -260,14 +246,13 @@ impl Engine {
             self.solve(is_open, report);
             clock.lap(Stage::Lcp, report);
             let change = self.update(target, &mut tool_pose, is_open, report);
-            moved += change;
             clock.lap(Stage::Update, report);
             if !standing.is_reached(change) {
                 continue;
             }
             if seeks_again && !is_fixed {
                 // Places were found where the part was before it moved: once more, where it is.
-                (seeks_again, moved) = (false, f64::INFINITY);
+                seeks_again = false;
                 self.begin_search();
             } else if !self.begins_round(&mut rounds, report) {
                 report.converged = true;
@@ -280,13 +265,12 @@ impl Engine {
         report.tool_pose = tool_pose;
         report.contacts = self.forces.carried().len() as u32;
         let from_contact = &report.contact_wrench_on_tool;
-        self.last_wrench = *from_contact;
         report.coupling_wrench_on_tool = self.held.wrench_on_tool(target, &tool_pose, from_contact);
     }
 
     /// No place is held any more.
     fn begin_search(&mut self) {
-        self.near.begin_stride(&self.forces, &self.places);
+        self.near.begin_stride(&self.forces);
         self.places.clear();
     }
 

@@ -6,7 +6,7 @@ use glam::{DQuat, DVec3};
 use glamx::DPose3;
 use snapin::engine::{Engine, StepReport};
 use snapin::prepare::PreparedPart;
-use snapin::scene::{Rates, Scene};
+use snapin::scene::{ContactAt, Rates, Scene};
 use snapin::session::fast::{FastLoop, FastSettings};
 use snapin::session::handover::Handed;
 use snapin::session::{self, Recording};
@@ -48,8 +48,13 @@ fn apart(a: &[f64; 6], b: &[f64; 6]) -> f64 {
 /// has been asked for other targets.
 #[test]
 fn a_frozen_problem_answers_at_its_own_target_as_the_step_did() {
-    for name in ["clip.toml", "hook.toml"] {
-        let (scene, part) = shipped(name);
+    for (name, contact_at) in [
+        ("clip.toml", ContactAt::Nodes),
+        ("clip.toml", ContactAt::Places),
+        ("hook.toml", ContactAt::Nodes),
+    ] {
+        let (mut scene, part) = shipped(name);
+        scene.accuracy.contact_at = contact_at;
         let mut engine = engine(&scene, &part);
         let mut problem = engine.frozen_problem();
         let mut touched = 0;

@@ -94,7 +94,6 @@ impl Engine {
             late: part.is_fetched().then(|| Late::new(max_contacts)),
             last_target: None,
             deviation: [0.0; 6],
-            last_wrench: [0.0; 6],
             reference: DVec3::ZERO,
             settings,
             part,

@@ -29,6 +29,8 @@ pub(super) struct ToolFeatures {
     memory: Memory,
     /// Of this pass; its capacity is that of the places.
     found: Vec<Found>,
+    /// Number of the first of them among the places of the pass.
+    first_place: u32,
     first_key: u32,
 }
 
@@ -58,6 +60,7 @@ impl ToolFeatures {
             appointments: Appointments::new(of_faces, n_candidates, clusters),
             memory: Memory::new(features.points().len()),
             found: Vec::with_capacity(max_near),
+            first_place: 0,
             near_distance,
             surface,
             features,
@@ -84,10 +87,13 @@ impl ToolFeatures {
         self.memory.reset();
     }
 
-    /// A stride begins: only features whose contacts carry force have had one. `carried`: their numbers among those found in
-    /// the last pass.
-    pub(super) fn begin_stride(&mut self, carried: impl Iterator<Item = u32>) {
-        let found = carried.filter_map(|k| self.found.get(k as usize));
+    /// A stride begins: only features whose contacts carry force have had one. `carried_at`: places that carry force, by
+    /// their number in the last pass.
+    pub(super) fn begin_stride(&mut self, carried_at: &[u32]) {
+        let own = carried_at
+            .iter()
+            .filter_map(|place| place.checked_sub(self.first_place));
+        let found = own.filter_map(|k| self.found.get(k as usize));
         self.memory.begin_stride(found);
     }
 }

@@ -80,14 +80,12 @@ impl Near {
     }
 
     /// A search for equilibrium begins: no place is held.
-    pub(super) fn begin_stride(&mut self, forces: &Forces, places: &Places) {
+    pub(super) fn begin_stride(&mut self, forces: &Forces) {
         if let Some(sites) = &mut self.sites {
             sites.begin_stride();
         }
         if let Some(features) = &mut self.features {
-            let n_held = places.n_held() as u32;
-            let carried = forces.carried_at().iter();
-            features.begin_stride(carried.filter_map(|place| place.checked_sub(n_held)));
+            features.begin_stride(forces.carried_at());
         }
     }
 

@@ -137,11 +137,6 @@ impl Places {
         self.list.capacity()
     }
 
-    /// Places that are held; those after them a pass found for itself.
-    pub(super) fn n_held(&self) -> usize {
-        self.n_held
-    }
-
     /// Holds what the last pass found for itself, too: more can be held beside.
     pub(super) fn hold_all(&mut self) {
         self.n_held = self.list.len();

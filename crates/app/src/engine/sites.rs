@@ -217,6 +217,9 @@ impl Sites {
         }
         let (values, _) = minima::edge_shape(self.surface.order(), t);
         let key = key + which.min(KEYS_OF_EDGE - 1) as u32;
+        if look.places.has(key) {
+            return true;
+        }
         let gap = look.offer(place(key, nodes, &values, look.part));
         gap.is_some_and(|gap| gap < look.near_distance)
     }
@@ -233,6 +236,9 @@ impl Sites {
     fn look_at_face(&self, face: usize, look: &mut Look<'_>) -> Option<f64> {
         let nodes = self.surface.nodes_of(face);
         let key = (self.n_candidates + KEYS_OF_EDGE * self.surface.n_edges() + face) as u32;
+        if look.places.has(key) {
+            return None;
+        }
         let mut rest = [DVec3::ZERO; MAX_FACE_NODES];
         for (rest, node) in rest.iter_mut().zip(nodes) {
             *rest = look.part.rest_positions()[*node as usize];

@@ -90,6 +90,7 @@ impl ToolFeatures {
             is_there
         });
         self.memory.remember(&self.found);
+        self.first_place = look.places.list().len() as u32;
         for found in &self.found {
             let u = found
                 .place

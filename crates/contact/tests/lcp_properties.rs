@@ -284,11 +284,15 @@ proptest! {
         let q: Vec<f64> =
             (0..m).map(|i| (0..m).map(|j| matrix[j * m + i] * load[j]).sum()).collect();
         let first = cold(&matrix, &q);
-        prop_assert_eq!(first.solution.status, Status::Solved, "{:?}", first.solution);
-        prop_assert!(first.solution.certificate.natural_residual < 1e-11, "{:?}", first.solution);
         let second = answer(&matrix, &q, &Settings::default(), Some(&warm[..m]));
+        // The gaps are unique. Of two answers with residual r they differ by up to the root of r where M is singular.
+        let (residual, gap) = if rank >= m { (1e-11, 1e-9) } else { (1e-10, 1e-5) };
+        for answer in [&first, &second] {
+            prop_assert_eq!(answer.solution.status, Status::Solved, "{:?}", answer.solution);
+            prop_assert!(answer.solution.certificate.natural_residual < residual, "{:?}", answer.solution);
+        }
         for (a, b) in first.w.iter().zip(&second.w) {
-            prop_assert!((a - b).abs() < 1e-9 * max_abs(&q));
+            prop_assert!((a - b).abs() < gap * max_abs(&q), "{a} and {b}");
         }
     }
 

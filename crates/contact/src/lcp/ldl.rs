@@ -102,14 +102,19 @@ pub(super) struct Ldl<'a> {
 impl<'a> Ldl<'a> {
     /// Without rows.
     pub(super) fn new(memory: &'a mut [f64], state: &'a mut LdlState, m: usize) -> Self {
-        state.forget();
-        let ldl = Self::kept(memory, state, m);
-        ldl.state.m = m;
-        ldl.state.is_in.clear();
-        ldl.state.is_in.resize(m, false);
-        ldl.state.rows.clear();
-        ldl.state.is_regularised = false;
+        let mut ldl = Self::kept(memory, state, m);
+        ldl.restart(m);
         ldl
+    }
+
+    /// Takes out all rows, for a problem of m rows, and E with them.
+    pub(super) fn restart(&mut self, m: usize) {
+        let state = &mut *self.state;
+        state.m = m;
+        state.is_in.clear();
+        state.is_in.resize(m, false);
+        state.rows.clear();
+        state.is_regularised = false;
     }
 
     /// With the factor that is there, see [`LdlState::holds`].

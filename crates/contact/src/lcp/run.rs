@@ -275,13 +275,26 @@ impl Run<'_> {
         }
         z.copy_from_slice(&scratch.best_z[..m]);
         dense::gaps_into(problem, z, w);
-        match only {
-            None => self.sweep_and_solve(scratch, z, w),
-            Some(_) => (Status::Budget, method),
+        if only.is_some() {
+            return (Status::Budget, method);
         }
+        if method == Method::BlockPivoting {
+            // Blocks may end where round-off hides what is wrong.
+            let only = Some(Method::ActiveSet);
+            if let Some((Status::Solved, method)) =
+                self.semidefinite(scratch, only, Start::Cold, z, w)
+            {
+                return (Status::Solved, method);
+            }
+        }
+        self.sweep_and_solve(scratch, z, w)
     }
 
-    /// Block pivoting, and where its budget ends, single pivots; how and by which method it ended. `held`: scratch of m.
+    /// Block pivoting, then single pivots where it did not end well; how and by which method it ended.
+    /// `held`: scratch of m.
+    ///
+    /// Blocks take rows that depend on one another, whose pivots may be round-off of round-off: only single pivots,
+    /// which take no such row of a semi-definite M, can say that M is indefinite.
     fn pivot(
         &mut self,
         work: &mut Work,
@@ -294,9 +307,10 @@ impl Run<'_> {
             let outcome = work.block_pivoting(factor, rounds_left);
             self.rounds += outcome.rounds;
             self.pivots += outcome.pivots;
-            if outcome.end != End::Budget || only.is_some() {
+            if outcome.end == End::Complementary || only.is_some() {
                 return (outcome.end, Method::BlockPivoting);
             }
+            factor.restart(work.problem.m());
         }
         let pivots_left = self.settings.max_pivots.saturating_sub(self.pivots);
         let outcome = active_set::solve(work, factor, held, pivots_left);

@@ -8,6 +8,7 @@
 //! Everything here is in the part's frame; the session converts from and to the world. What a scene does not call for is
 //! not in the [`Plan`] and is not built.
 
+mod ahead;
 mod appointments;
 mod build;
 mod clock;
@@ -40,6 +41,7 @@ use device::VirtualCoupling;
 use glam::DVec3;
 use glamx::DPose3;
 
+use ahead::Ahead;
 pub use build::NEAR_PER_ROW;
 use clock::StageClock;
 use forces::Forces;
@@ -83,6 +85,8 @@ pub struct Engine {
     /// Where columns are fetched.
     late: Option<Late>,
     last_target: Option<DPose3>,
+    /// Where the tool is round all over.
+    ahead: Option<Ahead>,
     /// Deviation of the tool from its target: position (m) and rotation vector (rad).
     deviation: [f64; 6],
     /// m, point of the tool's rows in the last pass.
@@ -152,6 +156,9 @@ impl Engine {
         self.rows.share.clear();
         self.near.reset();
         self.last_target = None;
+        if let Some(ahead) = &mut self.ahead {
+            ahead.forget();
+        }
         self.deviation = [0.0; 6];
         if let Some(late) = &mut self.late {
             late.clear();
@@ -225,13 +232,17 @@ impl Engine {
             ContactIterations::Fixed(_)
         );
         let max_passes = max_passes.min(most_passes.max(1));
+        self.go_ahead(target);
         self.begin_search();
         self.rows.share.begin_round();
         (report.passes, report.converged) = (0, false);
         let deepest_before = report.rigid_depth;
         let mut tool_pose = self.held.pose(target, &self.deviation);
         let mut standing = Standing::new(self.settings.near_distance, tolerance);
-        let mut seeks_again = self.has_moving_places();
+        // m, how far the part may move after places were sought: they are off by its square over the tool's diameter.
+        let reach_of_search = (2.0 * tolerance * self.tool.characteristic_size()).sqrt();
+        let mut moved = 0.0;
+        let mut may_seek_again = self.has_moving_places() && !is_fixed;
         let mut rounds = 0;
         let mut clock = StageClock::start();
         while report.passes < max_passes {
@@ -247,12 +258,13 @@ impl Engine {
             clock.lap(Stage::Lcp, report);
             let change = self.update(target, &mut tool_pose, is_open, report);
             clock.lap(Stage::Update, report);
+            moved += change;
             if !standing.is_reached(change) {
                 continue;
             }
-            if seeks_again && !is_fixed {
-                // Places were found where the part was before it moved: once more, where it is.
-                seeks_again = false;
+            if may_seek_again && moved > reach_of_search {
+                // Once more, where the part is now.
+                may_seek_again = false;
                 self.begin_search();
             } else if !self.begins_round(&mut rounds, report) {
                 report.converged = true;
@@ -266,6 +278,15 @@ impl Engine {
         report.contacts = self.forces.carried().len() as u32;
         let from_contact = &report.contact_wrench_on_tool;
         report.coupling_wrench_on_tool = self.held.wrench_on_tool(target, &tool_pose, from_contact);
+    }
+
+    /// Forces and tool go on as they went: what passes start from.
+    fn go_ahead(&mut self, target: &DPose3) {
+        if let Some(ahead) = &mut self.ahead {
+            let share = ahead.share(target, self.reach_of_rotation);
+            self.forces.go_ahead(share);
+            self.deviation = ahead.deviation(&self.deviation, share);
+        }
     }
 
     /// No place is held any more.

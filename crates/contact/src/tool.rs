@@ -57,6 +57,14 @@ pub enum Tool {
 }
 
 impl Tool {
+    /// Whether its surface has no facets, and no edges but those of a cylinder's ends.
+    pub fn is_round(&self) -> bool {
+        match self {
+            Self::Sphere(_) | Self::Cylinder(_) | Self::Capsule(_) | Self::HalfSpace(_) => true,
+            Self::Box(_) | Self::Mesh(_) | Self::Field(_) => false,
+        }
+    }
+
     /// Signed distance and outward normal at `point` of the part's frame.
     ///
     /// `pose_part_tool`: the tool's pose in the part's frame. Result in the part's frame. Does not allocate.

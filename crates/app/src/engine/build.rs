@@ -5,6 +5,7 @@ use std::sync::Arc;
 use contact::minima::is_doubly_curved;
 use glam::DVec3;
 
+use super::ahead::Ahead;
 use super::features::ToolFeatures;
 use super::forces::Forces;
 use super::held::Held;
@@ -73,6 +74,8 @@ impl Engine {
             let keys = (n, n_own);
             ToolFeatures::new(surface, features, clusters, near_distance, keys, max_near)
         });
+        // Under edges and facets there may be more than one equilibrium: the one next to where the part is, is meant.
+        let is_round = features.is_none() && tool.is_round();
         let held = Held::by(coupling).at(grip);
         Ok(Self {
             reach_of_rotation: tool.characteristic_size().min(extent(&part)),
@@ -93,6 +96,7 @@ impl Engine {
             forces: Forces::new(n, n_keys, max_near),
             late: part.is_fetched().then(|| Late::new(max_contacts)),
             last_target: None,
+            ahead: is_round.then(Ahead::default),
             deviation: [0.0; 6],
             reference: DVec3::ZERO,
             settings,

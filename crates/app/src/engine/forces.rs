@@ -65,12 +65,20 @@ impl Loads {
     pub(super) fn is_loaded(&self, candidate: u32) -> bool {
         self.place_of[candidate as usize] != NONE
     }
+
+    /// What a node carries, if it carries something.
+    fn of(&self, candidate: u32) -> Option<&ActiveContact> {
+        self.active.get(self.place_of[candidate as usize] as usize)
+    }
 }
 
 /// Forces on the part, by node and by contact.
 #[derive(Debug)]
 pub(super) struct Forces {
     loads: Loads,
+    /// At the end of the stride before the last, and room for those that are foreseen.
+    before: Loads,
+    ahead: Loads,
     /// Keys and normal forces (N) of the contacts that carry some, and by key whether it does.
     carried: Vec<(u32, f64)>,
     is_carried: Vec<bool>,
@@ -87,6 +95,8 @@ impl Forces {
     pub(super) fn new(n_candidates: usize, n_keys: usize, max_near: usize) -> Self {
         Self {
             loads: Loads::new(n_candidates),
+            before: Loads::new(n_candidates),
+            ahead: Loads::new(n_candidates),
             carried: Vec::with_capacity(max_near),
             is_carried: vec![false; n_keys],
             carried_at: Vec::with_capacity(max_near),
@@ -98,7 +108,34 @@ impl Forces {
     /// No force, nothing known.
     pub(super) fn clear(&mut self) {
         self.forget();
+        self.before.clear();
         self.pairs.reset();
+    }
+
+    /// Where forces will be when the tool goes on by `share` of the way of its last stride: linear in that way. Only what
+    /// passes start from, and where places are sought; they end where they end.
+    pub(super) fn go_ahead(&mut self, share: f64) {
+        self.ahead.clear();
+        for now in &self.loads.active {
+            let mut ahead = *now;
+            if let Some(before) = self.before.of(now.candidate) {
+                ahead.normal_force += share * (now.normal_force - before.normal_force);
+                ahead.force_on_part += share * (now.force_on_part - before.force_on_part);
+                // It would let go: a contact does not pull.
+                if ahead.normal_force * now.normal_force < 0.0 {
+                    continue;
+                }
+            }
+            let ActiveContact {
+                candidate,
+                normal_force,
+                force_on_part,
+            } = ahead;
+            self.ahead.load(candidate, normal_force, force_on_part);
+        }
+        std::mem::swap(&mut self.before, &mut self.loads);
+        std::mem::swap(&mut self.loads, &mut self.ahead);
+        self.known.forget();
     }
 
     fn forget(&mut self) {

@@ -3,6 +3,9 @@
 /// Of the change of the last pass over that of the one before, below which passes are taken to shrink steadily.
 const STEADY: f64 = 0.25;
 
+/// Passes are not taken to shrink faster than this: the first one does all that is linear, and says little of the others.
+const FASTEST: f64 = 0.02;
+
 #[derive(Debug)]
 pub(super) struct Standing {
     near_distance: f64,
@@ -28,6 +31,7 @@ impl Standing {
         let ratio = change / self.change;
         let is_steady =
             self.change.is_finite() && ratio < STEADY && change < 0.01 * self.near_distance;
+        let ratio = ratio.max(FASTEST);
         let left = 2.0 * change * ratio / (1.0 - ratio);
         self.change = change;
         change <= self.tolerance || (is_steady && left <= self.tolerance)

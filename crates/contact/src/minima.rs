@@ -30,7 +30,7 @@ pub struct EdgeMinima {
     at: [f64; MAX_MINIMA],
     /// Whether the edge lies along the tool: all its nodes are where it is nearest.
     pub is_along: bool,
-    /// m, least distance of the edge from the tool, of the points that were asked for.
+    /// m, least distance of the edge from the tool: of the points that were asked for, or where it is not searched, of all.
     pub least: f64,
 }
 
@@ -102,28 +102,36 @@ impl Edge<'_> {
         (seen.signed_distance, seen.normal.dot(along), seen.normal)
     }
 
-    /// m, distance of its middle.
-    pub fn middle_distance(&self, tool: &Tool, pose: &DPose3) -> f64 {
-        tool.signed_distance(pose, self.at(0.5).0).signed_distance
-    }
-
-    /// The local minima. `far` (m): an edge whose samples are all farther is not searched; `flat` (m): what the distance
-    /// may vary along an edge that lies along the tool.
-    pub fn minima(&self, tool: &Tool, pose: &DPose3, far: f64, flat: f64) -> EdgeMinima {
-        let samples = [0.0, 0.5, 1.0].map(|t| self.seen(tool, pose, t));
-        let least = samples.iter().map(|s| s.0).fold(f64::INFINITY, f64::min);
+    /// The local minima. `far` (m): an edge that is farther all along is not searched; `half` (m): no point of the edge is
+    /// farther than this from its middle; `flat` (m): what the distance may vary along an edge that lies along the tool.
+    pub fn minima(&self, tool: &Tool, pose: &DPose3, far: f64, half: f64, flat: f64) -> EdgeMinima {
+        let middle = self.seen(tool, pose, 0.5);
         let mut minima = EdgeMinima {
             n: 0,
             at: [0.0; MAX_MINIMA],
             is_along: false,
-            least,
+            least: middle.0 - half,
         };
-        // Also what is not a number is not near.
-        let is_near = least < far;
-        if !is_near {
+        // Far away the middle is enough.
+        if minima.least > far + half {
             return minima;
         }
-        let [first, middle, last] = samples;
+        let [first, last] = [0.0, 1.0].map(|t| self.seen(tool, pose, t));
+        let least = first.0.min(middle.0).min(last.0);
+        let mut sure = least - 0.5 * half;
+        if tool.is_round() {
+            // Convex along a straight edge, so above the tangents at its ends and middle.
+            let bend = (self.at(0.5).0 - 0.5 * (self.nodes[0] + self.nodes[1])).length();
+            let halves = above_tangents(first, middle).min(above_tangents(middle, last));
+            sure = sure.max(halves - 2.0 * bend);
+        }
+        // Also what is not a number is not near.
+        let is_near = sure < far;
+        if !is_near {
+            minima.least = sure;
+            return minima;
+        }
+        minima.least = least;
         let bend = (middle.1 - first.1).abs().max((last.1 - middle.1).abs());
         let tilt = (last.0 - first.0).abs();
         // h/8 of the parabola through the ends and the middle; h is twice the change of slope over half of the edge.
@@ -161,8 +169,9 @@ impl Edge<'_> {
     /// The zero of the slope between `from` and half an edge on: regula falsi that halves a side that stands still
     /// (Illinois), safe over the bends of meshes.
     fn root(&self, tool: &Tool, pose: &DPose3, from: f64, at_from: f64, at_to: f64) -> (f64, f64) {
-        /// Of the edge: a place that is off by this has a gap that is off by its square over the tool's diameter.
-        const STANDSTILL: f64 = 1e-7;
+        /// Of the edge, the last step of those that shorten fast: a place that is off by x has a gap that is off by x² over
+        /// the tool's diameter.
+        const STANDSTILL: f64 = 1e-4;
         const MOST_STEPS: usize = 20;
         let (mut a, mut f_a, mut b, mut f_b) = (from, at_from, from + 0.5, at_to);
         let mut best = (from, f64::INFINITY);
@@ -192,6 +201,17 @@ impl Edge<'_> {
         }
         best
     }
+}
+
+/// The least distance between two points half an edge apart, as the tangents there tell of a convex one.
+fn above_tangents(left: (f64, f64, DVec3), right: (f64, f64, DVec3)) -> f64 {
+    let (fall, rise) = (left.1, right.1);
+    if fall >= 0.0 || rise <= 0.0 {
+        return left.0.min(right.0);
+    }
+    // Where the tangents cross, of half an edge.
+    let at = ((right.0 - left.0 - 0.5 * rise) / (fall - rise)).clamp(0.0, 0.5);
+    (left.0 + fall * at).min(right.0 - rise * (0.5 - at))
 }
 
 /// Whether a minimum of the distance can lie inside a face: not under a tool that is straight one way.

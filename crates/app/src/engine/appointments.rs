@@ -1,7 +1,8 @@
 //! When edges or faces of the part can come near: not before their nodes and the tool have moved far enough.
 //!
-//! The sums of motions are kept by cluster of nodes (`watch`). A site is moved by no more than all the clusters that its
-//! nodes are in together, and by what the forces on its own nodes do to these; sites of the same clusters wait as a group.
+//! The sums of motions are kept by cluster of nodes (`watch`). From look to look a site is moved by no more than that of
+//! the clusters of its nodes which moves most, and by what the forces on its own nodes do to these; sites of the same
+//! clusters wait as a group.
 
 use std::collections::BTreeMap;
 
@@ -16,6 +17,11 @@ pub(super) struct Appointments {
     clusters: Vec<Vec<u32>>,
     /// Sites of each group.
     sites: Vec<Vec<u32>>,
+    /// By group: its sum of motions, m, up to the sums that were taken in.
+    moved: Vec<f64>,
+    /// Those, by cluster, and of the tool.
+    taken_in: Vec<f64>,
+    taken_in_of_tool: f64,
     /// By group: none of its sites is due before this, m of its sum of motions.
     next: Vec<f64>,
     group_of: Vec<u32>,
@@ -73,6 +79,9 @@ impl Appointments {
         }
         let (clusters, sites): (Vec<_>, Vec<_>) = groups.into_iter().unzip();
         Self {
+            moved: vec![0.0; sites.len()],
+            taken_in: vec![0.0; of_nodes.len()],
+            taken_in_of_tool: 0.0,
             next: vec![0.0; sites.len()],
             due_at: vec![0.0; n_sites],
             n_starts: 0,
@@ -84,18 +93,27 @@ impl Appointments {
         }
     }
 
-    /// All sites are due.
+    /// All sites are due, and sums of motions begin anew.
     pub(super) fn begin(&mut self) {
+        self.moved.fill(0.0);
+        self.taken_in.fill(0.0);
+        self.taken_in_of_tool = 0.0;
         self.next.fill(0.0);
         self.due_at.fill(0.0);
     }
 
-    /// Takes in what has moved since the last look beside the sums: nodes under their own forces.
+    /// Takes in what has moved since the last look.
     pub(super) fn take_in(&mut self, watch: &Watch, part: &ContactPart) {
-        let n_starts = watch.sums().n_starts;
-        if std::mem::replace(&mut self.n_starts, n_starts) != n_starts {
+        let sums = watch.sums();
+        if std::mem::replace(&mut self.n_starts, sums.n_starts) != sums.n_starts {
             self.begin();
         }
+        for group in 0..self.sites.len() {
+            self.moved[group] = self.moved(group, sums);
+        }
+        self.taken_in.copy_from_slice(sums.by_force);
+        self.taken_in_of_tool = sums.by_tool;
+        // Beside the sums: nodes under their own forces.
         for &(candidate, change) in watch.changed() {
             let moved = part.largest_block(candidate) * change;
             let range = self.first_of[candidate as usize]..self.first_of[candidate as usize + 1];
@@ -135,8 +153,9 @@ impl Appointments {
     /// m, how far the sites of a group and the tool have moved at most.
     #[inline]
     fn moved(&self, group: usize, sums: Sums<'_>) -> f64 {
-        let of_nodes = self.clusters[group].iter();
-        sums.by_tool + of_nodes.map(|c| sums.by_force[*c as usize]).sum::<f64>()
+        let since = |c: &u32| sums.by_force[*c as usize] - self.taken_in[*c as usize];
+        let of_nodes = self.clusters[group].iter().map(since).fold(0.0, f64::max);
+        self.moved[group] + (sums.by_tool - self.taken_in_of_tool) + of_nodes
     }
 
     /// Tells of all sites that may be nearer than they are waited for by `distance` (m).

@@ -11,6 +11,7 @@ use contact::Place;
 use contact::face::MAX_FACE_NODES;
 use contact::minima::{self, Edge, MAX_EDGE_NODES, UndentedFace};
 use contact::surface::Surface;
+use contact::tool::Tool;
 use glam::DVec3;
 
 use super::ContactPart;
@@ -22,8 +23,10 @@ use super::watch::Watch;
 /// Places along an edge that have keys of their own.
 const KEYS_OF_EDGE: usize = 2;
 
-/// Of what a searched edge has left to the near distance, what is waited for: it is searched in a few points only.
+/// Of what a searched edge has left to the near distance, what is waited for: it is searched in a few points only. The
+/// distance from a round tool is convex along a straight edge, so that nothing is missed there but by the edge's bend.
 const TRUST: f64 = 0.5;
+const TRUST_ROUND: f64 = 0.9;
 
 /// Edges and faces that can touch.
 #[derive(Debug)]
@@ -176,31 +179,25 @@ impl Sites {
             order: self.surface.order(),
             nodes: now,
         };
-        // Cheap first: by the middle alone. What the part has moved the edge's nodes apart by is added to its length.
+        // What the part has moved the edge's nodes apart by is added to its length.
         let rest = look.part.rest_positions();
         let apart_at_rest = (rest[nodes[0] as usize] - rest[nodes[1] as usize]).length();
         let stretch = ((now[0] - now[1]).length() / apart_at_rest).max(1.0);
         let half = stretch * self.halves[index];
-        let middle = edge.middle_distance(look.tool, look.tool_pose);
-        let beyond = middle - half - look.near_distance;
-        if beyond > half {
-            return Some(beyond);
-        }
-        // A sample is no farther than a quarter of the edge from any point.
-        let (reach, apart) = (look.near_distance, 0.5 * half);
-        let found = edge.minima(look.tool, look.tool_pose, reach + apart, self.flat);
+        let reach = look.near_distance;
+        let found = edge.minima(look.tool, look.tool_pose, reach, half, self.flat);
         let mut is_near = false;
         if found.is_along {
             for &node in nodes {
                 is_near |= self.offer_node(node, look);
             }
         } else if found.at().is_empty() {
-            return Some((found.least - apart - reach).max(0.0));
+            return Some((found.least - reach).max(0.0));
         }
         for (k, &t) in found.at().iter().enumerate() {
             is_near |= self.offer_along(nodes, key, k, t, look);
         }
-        (!is_near).then(|| (TRUST * (found.least - reach)).max(0.0))
+        (!is_near).then(|| (trust(look.tool) * (found.least - reach)).max(0.0))
     }
 
     /// Offers a place along an edge, or the node that it is at; whether it is near.
@@ -263,8 +260,12 @@ impl Sites {
         let is_near = look
             .offer(place)
             .is_some_and(|gap| gap < look.near_distance);
-        (!is_near).then(|| (TRUST * (distance - look.near_distance)).max(0.0))
+        (!is_near).then(|| (trust(look.tool) * (distance - look.near_distance)).max(0.0))
     }
+}
+
+fn trust(tool: &Tool) -> f64 {
+    if tool.is_round() { TRUST_ROUND } else { TRUST }
 }
 
 /// The place of these weights.

@@ -52,7 +52,7 @@ fn a_minimum_across_the_tool_is_found_to_round_off() {
         arc[0].z += 0.01;
         arc[1].z -= 0.03;
         let edge = edge(&arc);
-        let minima = edge.minima(&tool, &pose, 1.0, 1e-4);
+        let minima = edge.minima(&tool, &pose, 1.0, 1.0, 1e-4);
         let [t] = minima.at() else {
             panic!("{minima:?}");
         };
@@ -69,7 +69,7 @@ fn a_minimum_across_the_tool_is_found_to_round_off() {
 fn ends_are_minima_where_the_distance_falls_towards_them_and_far_edges_have_none() {
     let tool = Tool::Sphere(Sphere::new(1.0).unwrap());
     let pose = DPose3::from_translation(DVec3::new(4.0, 0.0, 1.0));
-    let at = |far: f64| edge(&ARC).minima(&tool, &pose, far, 1e-4);
+    let at = |far: f64| edge(&ARC).minima(&tool, &pose, far, 1.0, 1e-4);
     assert_eq!(at(10.0).at(), [1.0]);
     assert_eq!(at(0.1).at(), [0.0; 0]);
     assert!(at(0.1).least > 2.0);
@@ -77,7 +77,7 @@ fn ends_are_minima_where_the_distance_falls_towards_them_and_far_edges_have_none
     let pose = DPose3::from_translation(DVec3::new(0.0, 0.0, -50.0));
     let big = Tool::Sphere(Sphere::new(49.0).unwrap());
     let flat = [ARC[0], ARC[1]].map(|x| x - DVec3::new(0.0, 0.0, 0.1));
-    let minima = edge(&flat).minima(&big, &pose, 10.0, 1e-9);
+    let minima = edge(&flat).minima(&big, &pose, 10.0, 1.0, 1e-9);
     assert_eq!(minima.at().len(), 1);
 }
 
@@ -88,10 +88,10 @@ fn an_edge_along_the_tool_has_no_minimum_of_its_own() {
         glam::DQuat::from_rotation_arc(DVec3::Z, DVec3::X),
     );
     let straight = [ARC[0], ARC[1], DVec3::ZERO];
-    let minima = edge(&straight).minima(&tube(3.0), &along, 1.0, 1e-3);
+    let minima = edge(&straight).minima(&tube(3.0), &along, 1.0, 1.0, 1e-3);
     assert!(minima.is_along && minima.at().is_empty());
     let plane = Tool::HalfSpace(HalfSpace);
-    let minima = edge(&straight).minima(&plane, &DPose3::IDENTITY, 1.0, 1e-3);
+    let minima = edge(&straight).minima(&plane, &DPose3::IDENTITY, 1.0, 1.0, 1e-3);
     assert!(minima.is_along && minima.at().is_empty());
 }
 

@@ -88,7 +88,7 @@ fn the_study_of_passes_is_whole_resumes_and_refuses_what_is_not_its_own() {
         row["errors"][key].as_f64().unwrap()
     };
     // Converged planes are exact but for their tolerance of a nanometre; one pass is within a hundredth at this pace,
-    // two are nearly converged (they start from forces foreseen over a step 20 times that of a hand), more are.
+    // two are nearly converged (they start from forces foreseen over the study's long steps), more are.
     let solver: Vec<f64> = ["1 pass", "2 passes", "3 passes", "5 passes", "converged"]
         .map(|label| error(label, "solver_l2"))
         .to_vec();

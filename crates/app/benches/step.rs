@@ -2,8 +2,8 @@
 //!
 //! Measures: scenes/clip.toml (about 686 nodes, 293 quadratic elements), the tube pushed in from
 //! first touch to home in 1000 steps of the script, 20 times over; only steps that carry contact
-//! count; contact at nodes, and at places that move with the tube. Printed beside what the paper measured on a Pentium 4 at 2.4 GHz (Duriez et al. 2004,
-//! 5.2). `cargo bench -p snapin` runs it on one core.
+//! count; contact at nodes, and at places that move with the tube. Printed beside what the paper
+//! measured on a Pentium 4 at 2.4 GHz (Duriez et al. 2004, 5.2). `cargo bench -p snapin` runs it on one core.
 
 #![allow(
     clippy::unwrap_used,

@@ -85,7 +85,7 @@ pub struct Engine {
     /// Where columns are fetched.
     late: Option<Late>,
     last_target: Option<DPose3>,
-    /// Where the tool is round all over.
+    /// Where passes go to their end under a tool that is round all over.
     ahead: Option<Ahead>,
     /// Deviation of the tool from its target: position (m) and rotation vector (rad).
     deviation: [f64; 6],

@@ -88,13 +88,12 @@ fn the_study_of_passes_is_whole_resumes_and_refuses_what_is_not_its_own() {
         row["errors"][key].as_f64().unwrap()
     };
     // Converged planes are exact but for their tolerance of a nanometre; one pass is within a hundredth at this pace,
-    // two are nearly converged (they start from forces foreseen over the study's long steps), more are.
+    // two and more are nearly converged.
     let solver: Vec<f64> = ["1 pass", "2 passes", "3 passes", "5 passes", "converged"]
         .map(|label| error(label, "solver_l2"))
         .to_vec();
     assert!(solver[0] > 1e-3 && solver[0] < 1e-2, "{solver:?}");
-    assert!(solver[1] < 1e-4, "{solver:?}");
-    assert!(solver[2..4].iter().all(|e| *e < 1e-5), "{solver:?}");
+    assert!(solver[1..4].iter().all(|e| *e < 1e-5), "{solver:?}");
     assert!(solver[4] < 1e-6, "{solver:?}");
     // The mesh's own error is the same for all of them.
     let wrench = error("converged", "wrench_l2");

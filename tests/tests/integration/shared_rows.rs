@@ -44,8 +44,9 @@ fn shared_rows_follow_a_tool_that_moves_and_their_estimate_bounds_what_they_lose
     for rows in [4, 6, 8, 12] {
         for step in [2e-5, 5e-5, 1e-4] {
             let (mut full, mut few) = (engine(500), engine(rows));
-            let (mut n_shared, mut worst) = (0, 0.0f64);
+            let (mut n_contact, mut n_shared, mut worst) = (0, 0, 0.0f64);
             compared([&mut full, &mut few], step, |exact, ours| {
+                n_contact += u32::from(exact.contacts > 0);
                 assert!(exact.converged && ours.converged && ours.lcp_solved);
                 assert!(exact.rows == exact.near && ours.rows as usize <= rows);
                 n_shared += u32::from(ours.rows < ours.near);
@@ -61,7 +62,10 @@ fn shared_rows_follow_a_tool_that_moves_and_their_estimate_bounds_what_they_lose
                     ours.merge_error
                 );
             });
-            assert!(n_shared > 30, "{rows} rows, {step} m: {n_shared}");
+            assert!(
+                2 * n_shared > n_contact && n_contact > 50,
+                "{rows} rows, {step} m: {n_shared} of {n_contact}"
+            );
             assert!(worst < 0.03, "{rows} rows, {step} m: {worst}");
         }
     }

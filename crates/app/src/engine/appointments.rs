@@ -154,7 +154,9 @@ impl Appointments {
     #[inline]
     fn moved(&self, group: usize, sums: Sums<'_>) -> f64 {
         let since = |c: &u32| sums.by_force[*c as usize] - self.taken_in[*c as usize];
-        let of_nodes = self.clusters[group].iter().map(since).fold(0.0, f64::max);
+        // What is not a number stays seen: then all are looked at.
+        let larger = |a: f64, b: f64| if b > a || b.is_nan() { b } else { a };
+        let of_nodes = self.clusters[group].iter().map(since).fold(0.0, larger);
         self.moved[group] + (sums.by_tool - self.taken_in_of_tool) + of_nodes
     }
 

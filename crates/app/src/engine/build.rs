@@ -16,7 +16,7 @@ use super::places::Places;
 use super::rows::Rows;
 use super::sites::Sites;
 use super::watch::Watch;
-use super::{ContactPart, ContactPlaces, Engine, Plan};
+use super::{ContactIterations, ContactPart, ContactPlaces, Engine, Plan};
 
 /// Near nodes that memory is reserved for, in rows of the LCP.
 pub const NEAR_PER_ROW: usize = 8;
@@ -75,7 +75,9 @@ impl Engine {
             ToolFeatures::new(surface, features, clusters, near_distance, keys, max_near)
         });
         // Under edges and facets there may be more than one equilibrium: the one next to where the part is, is meant.
-        let is_round = features.is_none() && tool.is_round();
+        // A fixed number of passes starts from there too, as the paper's one pass does.
+        let converges = settings.contact_iterations == ContactIterations::Converged;
+        let goes_ahead = converges && features.is_none() && tool.is_round();
         let held = Held::by(coupling).at(grip);
         Ok(Self {
             reach_of_rotation: tool.characteristic_size().min(extent(&part)),
@@ -96,7 +98,7 @@ impl Engine {
             forces: Forces::new(n, n_keys, max_near),
             late: part.is_fetched().then(|| Late::new(max_contacts)),
             last_target: None,
-            ahead: is_round.then(Ahead::default),
+            ahead: goes_ahead.then(Ahead::default),
             deviation: [0.0; 6],
             reference: DVec3::ZERO,
             settings,

@@ -98,9 +98,13 @@ impl Judge {
 /// which bends y.
 const PROOF: f64 = 1e-9;
 
+/// Forces beyond this times those that close the largest gap alone are none: M is known to less.
+const LARGEST_FORCES: f64 = 1e6;
+
 /// Whether y proves that no z ≥ 0 gives w ≥ 0: y ≥ 0, Mᵀ y ≤ 0, qᵀ y < 0. Source: Farkas' lemma.
 ///
-/// Signs are judged to [`PROOF`] of the sum of absolute terms.
+/// Signs are judged to [`PROOF`] of the sum of absolute terms. What is left of Mᵀ y above zero lets forces of a sum of
+/// -qᵀ y / max (Mᵀ y) do it; only where they are beyond [`LARGEST_FORCES`] is it a proof.
 pub(super) fn proves_no_solution(problem: &Problem, y: &[f64]) -> bool {
     let weigh = |values: &[f64]| {
         values
@@ -115,10 +119,17 @@ pub(super) fn proves_no_solution(problem: &Problem, y: &[f64]) -> bool {
     if !sum.is_finite() || sum >= -PROOF * size || y.iter().any(|&y| y < 0.0) {
         return false;
     }
-    (0..problem.m()).all(|j| {
+    let mut left = 0.0_f64;
+    let is_proof = (0..problem.m()).all(|j| {
         let (sum, size) = weigh(problem.column(j));
+        left = left.max(sum);
         sum <= PROOF * size
-    })
+    });
+    let largest = |values: &mut dyn Iterator<Item = f64>| values.map(f64::abs).fold(0.0, f64::max);
+    let gap = largest(&mut problem.q().iter().copied());
+    let compliance = largest(&mut (0..problem.m()).map(|j| problem.diagonal(j)));
+    // Also where no row gives way by itself.
+    is_proof && -sum * compliance >= LARGEST_FORCES * gap * left
 }
 
 #[cfg(test)]

@@ -49,7 +49,7 @@ pub use frozen::{FrozenProblem, Prediction};
 pub use held::Grip;
 use held::Held;
 use late::Late;
-use law::Frictionless;
+use law::{Carried, Given, Law};
 use near::{Look, Near};
 pub use part::ContactPart;
 use places::Places;
@@ -80,7 +80,7 @@ pub struct Engine {
     near: Near,
     places: Places,
     rows: Rows,
-    law: Frictionless,
+    law: Law,
     forces: Forces,
     /// Where columns are fetched.
     late: Option<Late>,
@@ -154,6 +154,9 @@ impl Engine {
         self.forces.clear();
         self.places.clear();
         self.rows.share.clear();
+        if let Some(coulomb) = self.law.coulomb_mut() {
+            coulomb.clear();
+        }
         self.near.reset();
         self.last_target = None;
         if let Some(ahead) = &mut self.ahead {
@@ -196,6 +199,10 @@ impl Engine {
             late.begin_step(&self.part);
         }
         let from = self.last_target.unwrap_or(*target);
+        let tool_pose = self.held.pose(&from, &self.deviation);
+        if let Some(coulomb) = self.law.coulomb_mut() {
+            coulomb.begin_step(&self.forces, tool_pose);
+        }
         let motion = self.motion(&from, target);
         let n_strides = (motion / self.settings.max_stride)
             .ceil()
@@ -252,7 +259,7 @@ impl Engine {
             clock.lap(Stage::Proximity, report);
             self.draw(&tool_pose, report);
             clock.lap(Stage::Planes, report);
-            let is_open = self.assemble();
+            let is_open = self.assemble(&tool_pose);
             clock.lap(Stage::Delassus, report);
             self.solve(is_open, report);
             clock.lap(Stage::Lcp, report);
@@ -327,7 +334,7 @@ impl Engine {
 
     /// Gaps without force, and where some are closed, what closes them gives way. Whether all are open: then no force is
     /// the exact answer.
-    fn assemble(&mut self) -> bool {
+    fn assemble(&mut self, tool_pose: &DPose3) -> bool {
         let bodies = Bodies {
             part: &self.part,
             held: &self.held,
@@ -337,20 +344,29 @@ impl Engine {
         let is_open = self.rows.open_gaps(&self.places, &bodies);
         if !is_open {
             self.places.fetch(&mut self.forces.pairs, &self.part);
-            self.rows.assemble(&self.places, &self.forces, &bodies);
+            let given = Given {
+                places: &self.places,
+                forces: &self.forces,
+                bodies: &bodies,
+                tool_pose,
+            };
+            self.law.assemble(&mut self.rows, &given);
         }
         is_open
     }
 
-    /// Normal forces.
+    /// Forces of the contacts.
     fn solve(&mut self, is_open: bool, report: &mut StepReport) {
         if is_open {
             self.law.rest(self.rows.contacts.len(), report);
-        } else {
-            let settings = &self.settings.lcp;
-            self.law
-                .solve(&mut self.rows, &self.places, &self.forces, settings, report);
+            return;
         }
+        let carried = Carried {
+            places: &self.places,
+            forces: &self.forces,
+            settings: &self.settings.lcp,
+        };
+        self.law.solve(&mut self.rows, &carried, report);
     }
 
     /// Forces become the state; places and tool go where they balance. The largest change of either, m.
@@ -370,10 +386,10 @@ impl Engine {
             reference,
             ..
         } = self;
-        let normal_forces = self.law.normal_forces();
-        let of_places = places.move_under(&rows.contacts, normal_forces, &forces.pairs, part);
-        forces.adopt(places.list(), &rows.contacts, normal_forces);
-        let (force, torque) = wrench_on_tool(&rows.contacts, normal_forces, *reference);
+        let by_contact = self.law.forces();
+        let of_places = places.move_under(&rows.contacts, by_contact, &forces.pairs, part);
+        forces.adopt(places.list(), &rows.contacts, by_contact);
+        let (force, torque) = wrench_on_tool(&rows.contacts, &by_contact.on_part, *reference);
         let wrench = [force.x, force.y, force.z, torque.x, torque.y, torque.z];
         report.contact_wrench_on_tool = wrench;
         self.deviation = held.deviation_under(&wrench);
@@ -384,7 +400,7 @@ impl Engine {
             reference: *reference,
             deviation: &self.deviation,
         };
-        rows.weigh(places, normal_forces, &bodies, is_open, report);
+        rows.weigh(places, &by_contact.normal, &bodies, is_open, report);
         report.merged_badly = report.merge_error > self.settings.merge_tolerance;
         let of_tool = (moved.translation - tool_pose.translation).length()
             + self.reach_of_rotation * moved.rotation.angle_between(tool_pose.rotation);

@@ -150,9 +150,15 @@ impl Contact {
     /// h · (translation, rotation) of the tool, and `-h f_n` is the wrench (force N, torque N m about `reference`) on the tool.
     #[inline]
     pub fn tool_row(&self, reference: DVec3) -> [f64; 6] {
-        let [nx, ny, nz] = self.normal.to_array();
-        let [tx, ty, tz] = (self.point - reference).cross(self.normal).to_array();
-        [nx, ny, nz, tx, ty, tz]
+        self.tool_row_along(self.normal, reference)
+    }
+
+    /// The same along any unit direction d: [d, r × d].
+    #[inline]
+    pub fn tool_row_along(&self, direction: DVec3, reference: DVec3) -> [f64; 6] {
+        let [x, y, z] = direction.to_array();
+        let [tx, ty, tz] = (self.point - reference).cross(direction).to_array();
+        [x, y, z, tx, ty, tz]
     }
 
     /// Whether all its numbers are finite and the normal has unit length.
@@ -165,16 +171,16 @@ impl Contact {
     }
 }
 
-/// Force (N) and torque (N m about `reference`) of the normal forces `normal_force` (N, >= 0) on the tool, part's frame:
-/// `-Σ f_n h`.
+/// Force (N) and torque (N m about `reference`) that contacts with these forces on the part (N) exert on the tool, part's
+/// frame: `-Σ [f, r × f]`, which for normal forces is `-Σ f_n h`.
 pub fn wrench_on_tool(
     contacts: &[Contact],
-    normal_forces: &[f64],
+    forces_on_part: &[DVec3],
     reference: DVec3,
 ) -> (DVec3, DVec3) {
     let (mut force, mut torque) = (DVec3::ZERO, DVec3::ZERO);
-    for (contact, &normal_force) in contacts.iter().zip(normal_forces) {
-        let force_on_tool = -normal_force * contact.normal;
+    for (contact, &on_part) in contacts.iter().zip(forces_on_part) {
+        let force_on_tool = -on_part;
         force += force_on_tool;
         torque += (contact.point - reference).cross(force_on_tool);
     }

@@ -47,7 +47,8 @@
 //! assert_eq!(solution.status, Status::Solved);
 //! assert!(solution.certificate.natural_residual < 1e-14);
 //!
-//! let (force_on_tool, _torque) = wrench_on_tool(&contacts, &forces, DVec3::ZERO);
+//! let on_part: Vec<DVec3> = contacts.iter().zip(&forces).map(|(contact, f)| *f * contact.normal).collect();
+//! let (force_on_tool, _torque) = wrench_on_tool(&contacts, &on_part, DVec3::ZERO);
 //! assert!((force_on_tool - DVec3::new(0.0, 0.0, 2.0)).length() < 1e-12);
 //! # Ok(())
 //! # }

@@ -30,7 +30,10 @@ use std::collections::BinaryHeap;
 use glam::DVec3;
 
 use crate::contacts::Contact;
-use crate::delassus::{ComplianceBlocks, CouplingCompliance, check_size, for_each_entry};
+use crate::delassus::{
+    ComplianceBlocks, CouplingCompliance, Frame, check_frames, check_size, for_each_block,
+    for_each_entry,
+};
 use crate::error::Error;
 
 /// Estimated error of the resultant over sqrt(s). Once, a tube that slides over the nodes of the clip is underestimated in
@@ -252,6 +255,67 @@ impl Patches {
         Ok(())
     }
 
+    /// The same along normals and tangents, as by [`crate::delassus::delassus_frames_into`], column-major, 3 rows a patch.
+    /// The forces of a patch then rise, fall and turn together, so its contacts must have like tangents.
+    ///
+    /// # Errors
+    /// [`Error::Length`] unless there is a frame for each contact and `w` has nine times the patches squared entries.
+    pub fn delassus_frames_into(
+        &mut self,
+        compliance: &impl ComplianceBlocks,
+        contacts: &[Contact],
+        frames: &[Frame],
+        coupling: Option<CouplingCompliance>,
+        w: &mut [f64],
+    ) -> Result<(), Error> {
+        let n = 3 * self.len();
+        check_frames(frames, contacts.len())?;
+        check_size(w, n)?;
+        w.fill(0.0);
+        let Self {
+            patch_of,
+            shares,
+            shifts,
+            own,
+            ..
+        } = self;
+        shifts.clear();
+        shifts.resize(contacts.len(), 0.0);
+        own.clear();
+        own.resize(contacts.len(), 0.0);
+        for_each_block(compliance, contacts, frames, coupling, |i, j, block| {
+            let (g, h) = (patch_of[i] as usize, patch_of[j] as usize);
+            let share = shares[i] * shares[j];
+            for (b, column) in block.iter().enumerate() {
+                for (a, entry) in column.iter().enumerate() {
+                    w[(3 * h + b) * n + 3 * g + a] += share * entry;
+                    if i != j && g == h {
+                        w[(3 * h + a) * n + 3 * g + b] += share * entry;
+                    }
+                }
+            }
+            let entry = block[0][0];
+            if i == j {
+                shifts[i] += shares[i] * entry;
+                own[i] = entry;
+            } else if g == h {
+                shifts[i] += shares[j] * entry;
+                shifts[j] += shares[i] * entry;
+            }
+        });
+        for (i, shift) in shifts.iter_mut().enumerate() {
+            let g = 3 * patch_of[i] as usize;
+            let away = own[i] - 2.0 * *shift + w[g * n + g];
+            *shift = away / (1.0 - shares[i]);
+        }
+        for column in 0..n {
+            for row in 0..column {
+                w[row * n + column] = w[column * n + row];
+            }
+        }
+        Ok(())
+    }
+
     /// How far the gap of contact `i` opens when a unit of force is shifted to it from its patch as a whole, m/N:
     /// (e_i - p)ᵀ W (e_i - p) / (1 - p_i), of the last [`Self::delassus_into`]. In a patch of equal nodes that is what
     /// each of them gives way alone, without what all of them do together. `None` where there is nothing to shift, as
@@ -273,8 +337,14 @@ impl Patches {
     pub fn spread(&self, z: &mut [f64]) {
         // From the last: the patches' own are still needed until then.
         for i in (0..self.shares.len()).rev() {
-            z[i] = self.shares[i] * z[self.patch_of[i] as usize];
+            let (patch, share) = self.share_of(i);
+            z[i] = share * z[patch];
         }
+    }
+
+    /// The patch of contact `i`, and which share of its force the contact carries.
+    pub fn share_of(&self, i: usize) -> (usize, f64) {
+        (self.patch_of[i] as usize, self.shares[i])
     }
 }
 

@@ -10,7 +10,7 @@ use super::features::ToolFeatures;
 use super::forces::Forces;
 use super::held::Held;
 use super::late::Late;
-use super::law::Frictionless;
+use super::law::Law;
 use super::near::Near;
 use super::places::Places;
 use super::rows::Rows;
@@ -42,6 +42,7 @@ impl Engine {
             guide,
             places,
             features,
+            friction,
             mut settings,
         } = plan;
         // Where columns come one by one, those that were taken in are the engine's own reckoning.
@@ -94,7 +95,7 @@ impl Engine {
             },
             places: Places::new(n_keys, max_near, are_nodes),
             rows: Rows::new(n_keys, max_near, max_contacts),
-            law: Frictionless::new(max_near, max_contacts),
+            law: Law::new(friction, n, n_keys, max_near, max_contacts),
             forces: Forces::new(n, n_keys, max_near),
             late: part.is_fetched().then(|| Late::new(max_contacts)),
             last_target: None,

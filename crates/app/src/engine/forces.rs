@@ -3,6 +3,7 @@
 use contact::{Contact, Place};
 use glam::DVec3;
 
+use super::law::ByContact;
 use super::pairs::Pairs;
 use super::part::Deformed;
 use super::{ActiveContact, ContactPart};
@@ -35,12 +36,11 @@ impl Loads {
         }
     }
 
-    /// Adds a normal force (N) at a place.
+    /// Adds a force at a place: along the normal, and in all, N.
     #[inline]
-    pub(super) fn add(&mut self, place: &Place, normal_force: f64, normal: DVec3) {
+    pub(super) fn add(&mut self, place: &Place, normal_force: f64, on_part: DVec3) {
         for &(candidate, share) in place.shares() {
-            let force = share * normal_force;
-            self.load(candidate, force, force * normal);
+            self.load(candidate, share * normal_force, share * on_part);
         }
     }
 
@@ -147,16 +147,17 @@ impl Forces {
         self.known.forget();
     }
 
-    /// Makes the normal forces of these contacts (N) the state. Does not allocate.
-    pub(super) fn adopt(&mut self, places: &[Place], contacts: &[Contact], normal_forces: &[f64]) {
+    /// Makes the forces of these contacts the state. Does not allocate.
+    pub(super) fn adopt(&mut self, places: &[Place], contacts: &[Contact], forces: &ByContact) {
         self.forget();
-        for (contact, &force) in contacts.iter().zip(normal_forces) {
+        let forces = forces.normal.iter().zip(&forces.on_part);
+        for (contact, (&force, &on_part)) in contacts.iter().zip(forces) {
             if force > 0.0 {
                 let place = &places[contact.place as usize];
                 self.is_carried[place.key as usize] = true;
                 self.carried.push((place.key, force));
                 self.carried_at.push(contact.place);
-                self.loads.add(place, force, contact.normal);
+                self.loads.add(place, force, on_part);
             }
         }
     }
@@ -209,6 +210,51 @@ impl Forces {
     #[inline]
     pub(super) fn position(&mut self, part: &ContactPart, candidate: u32) -> DVec3 {
         part.rest_positions()[candidate as usize] + self.displacement(part, candidate)
+    }
+}
+
+/// A state that was, to ask for displacements.
+#[derive(Debug)]
+pub(super) struct State {
+    loads: Loads,
+    known: Known,
+}
+
+impl State {
+    /// No force.
+    pub(super) fn new(n_candidates: usize) -> Self {
+        Self {
+            loads: Loads::new(n_candidates),
+            known: Known::new(n_candidates),
+        }
+    }
+
+    /// Becomes what forces are now. Does not allocate.
+    pub(super) fn copy_from(&mut self, forces: &Forces) {
+        self.loads.clear();
+        for now in &forces.loads.active {
+            self.loads
+                .load(now.candidate, now.normal_force, now.force_on_part);
+        }
+        self.known.forget();
+    }
+
+    /// Displacement of a candidate then, m; summed once.
+    #[inline]
+    pub(super) fn displacement(&mut self, part: &ContactPart, pairs: &Pairs, node: u32) -> DVec3 {
+        let i = node as usize;
+        if let Some(known) = self.known.get(i) {
+            return known;
+        }
+        let active = &self.loads.active;
+        let deformed = Deformed {
+            part,
+            active,
+            pairs,
+        };
+        let displacement = deformed.displacement(i);
+        self.known.set(i, displacement);
+        displacement
     }
 }
 

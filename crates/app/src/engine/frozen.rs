@@ -70,6 +70,7 @@ pub struct FrozenProblem {
     q: Vec<f64>,
     /// N, by row, of the last answer.
     forces: Vec<f64>,
+    on_part: Vec<DVec3>,
     /// (m, rad), of the tool from its target in the last answer.
     deviation: [f64; 6],
     /// On the tool in the last answer.
@@ -255,13 +256,16 @@ impl FrozenProblem {
         }
         self.loads.clear();
         report.contacts = 0;
+        self.on_part.clear();
         for ((contact, place), &force) in self.contacts.iter().zip(&self.places).zip(&*forces) {
+            let on_part = force * contact.normal;
+            self.on_part.push(on_part);
             if force > 0.0 {
                 report.contacts += 1;
-                self.loads.add(place, force, contact.normal);
+                self.loads.add(place, force, on_part);
             }
         }
-        let (force, torque) = wrench_on_tool(&self.contacts, forces, self.reference);
+        let (force, torque) = wrench_on_tool(&self.contacts, &self.on_part, self.reference);
         let wrench = [force.x, force.y, force.z, torque.x, torque.y, torque.z];
         self.deviation = self.held.deviation_under(&wrench);
         self.wrench = wrench;

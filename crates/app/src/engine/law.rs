@@ -1,125 +1,124 @@
-//! The law of contact: rows to forces. Frictionless here: Signorini's conditions, a linear complementarity problem.
+//! The law of contact: rows to forces. Frictionless, or Coulomb's; a scene that calls for no friction has nothing of it.
+
+mod coulomb;
+mod frictionless;
 
 use contact::lcp;
+use glam::DVec3;
+use glamx::DPose3;
 
 use super::StepReport;
 use super::forces::Forces;
 use super::places::Places;
-use super::rows::Rows;
+use super::rows::{Bodies, Rows};
+pub(super) use coulomb::Coulomb;
+pub(super) use frictionless::Frictionless;
 
-/// Of each row's own compliance, what is added to it where no forces could hold a wedged tool: it then sinks in by this
-/// share of what it would give way alone.
-const GIVE: f64 = 1e-3;
-
-/// `w = q + W z, w >= 0, z >= 0, wᵀz = 0`, with its memory.
+/// Forces of the contacts, N.
 #[derive(Debug)]
-pub(super) struct Frictionless {
-    /// N, by row, then by contact.
-    z: Vec<f64>,
-    w: Vec<f64>,
-    warm: Vec<bool>,
-    scratch: lcp::Scratch,
+pub(super) struct ByContact {
+    /// Along the normals, >= 0.
+    pub(super) normal: Vec<f64>,
+    /// On the part, part's frame.
+    pub(super) on_part: Vec<DVec3>,
 }
 
-impl Frictionless {
-    /// As [`Rows::new`].
-    pub(super) fn new(max_near: usize, max_rows: usize) -> Self {
+impl ByContact {
+    fn new(max_near: usize) -> Self {
         Self {
-            z: vec![0.0; max_near],
-            w: vec![0.0; max_rows],
-            warm: vec![false; max_rows],
-            scratch: lcp::Scratch::new(max_rows),
+            normal: vec![0.0; max_near],
+            on_part: vec![DVec3::ZERO; max_near],
         }
     }
 
-    /// N, by contact.
-    pub(super) fn normal_forces(&self) -> &[f64] {
-        &self.z
+    fn clear(&mut self, n_contacts: usize) {
+        self.normal[..n_contacts].fill(0.0);
+        self.on_part[..n_contacts].fill(DVec3::ZERO);
+    }
+}
+
+/// What turns gaps into forces.
+#[derive(Debug)]
+pub(super) enum Law {
+    Frictionless(Frictionless),
+    Coulomb(Box<Coulomb>),
+}
+
+/// What rows are assembled from.
+pub(super) struct Given<'a> {
+    pub(super) places: &'a Places,
+    pub(super) forces: &'a Forces,
+    pub(super) bodies: &'a Bodies<'a>,
+    pub(super) tool_pose: &'a DPose3,
+}
+
+/// What a solution starts from.
+pub(super) struct Carried<'a> {
+    pub(super) places: &'a Places,
+    pub(super) forces: &'a Forces,
+    pub(super) settings: &'a lcp::Settings,
+}
+
+impl Law {
+    /// As [`Rows::new`]. `friction`: Coulomb's coefficient, where there is friction.
+    pub(super) fn new(
+        friction: Option<f64>,
+        n_candidates: usize,
+        n_keys: usize,
+        max_near: usize,
+        max_rows: usize,
+    ) -> Self {
+        match friction {
+            None => Self::Frictionless(Frictionless::new(max_near, max_rows)),
+            Some(mu) => {
+                let law = Coulomb::new(mu, n_candidates, n_keys, max_near, max_rows);
+                Self::Coulomb(Box::new(law))
+            }
+        }
+    }
+
+    pub(super) fn coulomb_mut(&mut self) -> Option<&mut Coulomb> {
+        match self {
+            Self::Frictionless(_) => None,
+            Self::Coulomb(coulomb) => Some(coulomb),
+        }
+    }
+
+    /// By contact.
+    pub(super) fn forces(&self) -> &ByContact {
+        match self {
+            Self::Frictionless(law) => &law.forces,
+            Self::Coulomb(law) => &law.forces,
+        }
     }
 
     /// No contact carries force: the exact answer where all gaps are open.
     pub(super) fn rest(&mut self, n_contacts: usize, report: &mut StepReport) {
-        self.z[..n_contacts].fill(0.0);
+        match self {
+            Self::Frictionless(law) => law.forces.clear(n_contacts),
+            Self::Coulomb(law) => law.rest(n_contacts, report),
+        }
         (report.certificate, report.lcp_solved) = (0.0, true);
+    }
+
+    /// What gives way, by rows: W, and where there is friction the slips without force.
+    pub(super) fn assemble(&mut self, rows: &mut Rows, given: &Given<'_>) {
+        match self {
+            Self::Frictionless(_) => rows.assemble(given.places, given.forces, given.bodies),
+            Self::Coulomb(law) => law.assemble(rows, given),
+        }
     }
 
     /// Finds the forces, warm-started from the contacts that carried some.
     pub(super) fn solve(
         &mut self,
         rows: &mut Rows,
-        places: &Places,
-        forces: &Forces,
-        settings: &lcp::Settings,
+        carried: &Carried<'_>,
         report: &mut StepReport,
     ) {
-        let m = rows.m;
-        let list = places.list();
-        let carries =
-            |contact: &contact::Contact| forces.is_carried(list[contact.place as usize].key);
-        match rows.share.patches() {
-            None => {
-                for (warm, contact) in self.warm.iter_mut().zip(&rows.contacts) {
-                    *warm = carries(contact);
-                }
-            }
-            Some(patches) => {
-                for (patch, warm) in self.warm.iter_mut().take(m).enumerate() {
-                    *warm = rows.contacts[patches.range(patch)].iter().any(carries);
-                }
-            }
+        match self {
+            Self::Frictionless(law) => law.solve(rows, carried, report),
+            Self::Coulomb(law) => law.solve(rows, carried.places, report),
         }
-        let mut solution = self.solve_rows(rows, settings);
-        if let Ok(first) = &solution
-            && matches!(
-                first.status,
-                lcp::Status::NoSolution | lcp::Status::Indefinite
-            )
-        {
-            // Wedged between what does not give way, or W spoilt by rounding: felt as nearly rigid, where no force at all
-            // would be an answer.
-            report.pivots += (first.rounds + first.pivots) as u32;
-            for i in 0..m {
-                rows.w_matrix[i * m + i] *= 1.0 + GIVE;
-            }
-            solution = self
-                .solve_rows(rows, settings)
-                .map(|solution| lcp::Solution {
-                    status: lcp::Status::NoSolution,
-                    ..solution
-                });
-        }
-        match solution {
-            Ok(solution) => {
-                report.pivots += (solution.rounds + solution.pivots) as u32;
-                report.certificate = solution.certificate.natural_residual;
-                report.lcp_solved = solution.status == lcp::Status::Solved;
-            }
-            // Only data that are not finite: no force, and the report says so.
-            Err(_) => {
-                self.z[..m].fill(0.0);
-                report.certificate = f64::INFINITY;
-                report.lcp_solved = false;
-            }
-        }
-        if let Some(patches) = rows.share.patches() {
-            patches.spread(&mut self.z);
-        }
-    }
-
-    fn solve_rows(
-        &mut self,
-        rows: &Rows,
-        settings: &lcp::Settings,
-    ) -> Result<lcp::Solution, contact::Error> {
-        let m = rows.m;
-        let problem = lcp::Problem::trusted_symmetric(&rows.w_matrix[..m * m], &rows.q[..m])?;
-        lcp::solve(
-            &problem,
-            settings,
-            &mut self.scratch,
-            lcp::Start::Rows(&self.warm[..m]),
-            &mut self.z[..m],
-            &mut self.w[..m],
-        )
     }
 }

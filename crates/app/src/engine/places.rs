@@ -12,6 +12,7 @@ use glamx::DPose3;
 
 use super::ContactPart;
 use super::forces::Forces;
+use super::law::ByContact;
 use super::pairs::Pairs;
 
 /// No place.
@@ -275,11 +276,11 @@ impl Places {
         }
     }
 
-    /// Displacements under the normal forces (N) of contacts at these places; the largest change, m.
+    /// Displacements under the forces of contacts at these places; the largest change, m.
     pub(super) fn move_under(
         &mut self,
         contacts: &[Contact],
-        normal_forces: &[f64],
+        forces: &ByContact,
         pairs: &Pairs,
         part: &ContactPart,
     ) -> f64 {
@@ -289,12 +290,12 @@ impl Places {
         u.clear();
         u.resize(n, DVec3::ZERO);
         let compliance = self.compliance(pairs, part);
-        for (contact, &force) in contacts.iter().zip(normal_forces) {
+        let forces = forces.normal.iter().zip(&forces.on_part);
+        for (contact, (&force, on_part)) in contacts.iter().zip(forces) {
             if force > 0.0 {
-                let on_part = force * contact.normal;
                 let j = contact.place as usize;
                 for (i, u) in u.iter_mut().enumerate() {
-                    *u += compliance.block(i, j) * on_part;
+                    *u += compliance.block(i, j) * *on_part;
                 }
             }
         }

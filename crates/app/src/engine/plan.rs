@@ -72,12 +72,14 @@ pub struct Plan {
     pub places: ContactPlaces,
     /// Corners and edges of the tool, that touch these faces between the nodes.
     pub features: Option<(Arc<Surface>, Features)>,
+    /// Coulomb's coefficient between part and tool, >= 0; `None`: no friction, and nothing is built for it.
+    pub friction: Option<f64>,
     /// What a step is allowed and asked to do.
     pub settings: EngineSettings,
 }
 
 impl Plan {
-    /// Contact at the nodes alone; the coupling, if there is one, is fastened at the tool's origin.
+    /// Contact at the nodes alone, without friction; the coupling, if there is one, is fastened at the tool's origin.
     pub fn new(
         part: Arc<ContactPart>,
         tool: Tool,
@@ -92,6 +94,7 @@ impl Plan {
             guide: None,
             places: ContactPlaces::Nodes,
             features: None,
+            friction: None,
             settings,
         }
     }

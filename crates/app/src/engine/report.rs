@@ -51,7 +51,7 @@ pub struct ActiveContact {
     /// N, along the tool's outward normals, on the part: its own, >= 0, and its shares N_a f_n of forces on faces, which
     /// may be below 0 at the vertex of a curved face. Sums over the nodes to the sum of all normal forces.
     pub normal_force: f64,
-    /// N, part frame: the same along each normal.
+    /// N, part frame: the same along each normal, and with friction across it.
     pub force_on_part: DVec3,
 }
 
@@ -71,6 +71,10 @@ pub struct StepReport {
     pub rows: u32,
     /// Nodes, and points of the tool's edges, that carry force.
     pub contacts: u32,
+    /// Of those that carry force, the ones that stick; with friction only.
+    pub sticking: u32,
+    /// J, that friction took in the step, >= 0 but for round-off; with friction only.
+    pub dissipated: f64,
     /// Near nodes and points of the tool's edges left out because memory for more was not reserved.
     pub dropped: u32,
     /// Near nodes left out because their column of the compliance is not there yet.
@@ -91,7 +95,7 @@ pub struct StepReport {
     pub strides: u32,
     /// Changes of the active set of all LCPs of the step, each one factorisation.
     pub pivots: u32,
-    /// Natural residual of the last LCP, scaled: max |min(z / max z, w / max q)|.
+    /// Natural residual of the last contact problem, scaled: max |min(z / max z, w / max q)|, or on the cone of friction.
     pub certificate: f64,
     /// Whether the last LCP was solved; otherwise its best answer was used.
     pub lcp_solved: bool,
@@ -112,6 +116,8 @@ impl StepReport {
             near: 0,
             rows: 0,
             contacts: 0,
+            sticking: 0,
+            dissipated: 0.0,
             dropped: 0,
             without_column: 0,
             merge_error: 0.0,

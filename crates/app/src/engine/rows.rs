@@ -22,9 +22,9 @@ pub(super) struct Bodies<'a> {
 }
 
 impl Bodies<'_> {
-    /// m, how far the tool comes towards a contact by its deviation.
-    fn along(&self, contact: &Contact) -> f64 {
-        let row = contact.tool_row(self.reference);
+    /// m, how far the tool comes towards a contact along a unit direction by its deviation.
+    pub(super) fn along(&self, contact: &Contact, direction: DVec3) -> f64 {
+        let row = contact.tool_row_along(direction, self.reference);
         row.iter().zip(self.deviation).map(|(h, e)| h * e).sum()
     }
 }
@@ -100,7 +100,7 @@ impl Rows {
         let u = places.displacements();
         for (q, contact) in self.q.iter_mut().zip(&self.contacts) {
             let by_part = contact.normal.dot(u[contact.place as usize]);
-            *q = contact.gap - by_part + bodies.along(contact);
+            *q = contact.gap - by_part + bodies.along(contact, contact.normal);
         }
         let n = self.contacts.len();
         let is_open = self.q[..n].iter().all(|q| *q >= 0.0);
@@ -138,7 +138,12 @@ impl Rows {
             return;
         }
         let u = places.displacements();
-        let motion_of = |contact: &Contact| (u[contact.place as usize], bodies.along(contact));
+        let motion_of = |contact: &Contact| {
+            (
+                u[contact.place as usize],
+                bodies.along(contact, contact.normal),
+            )
+        };
         let key_of = |contact: &Contact| places.list()[contact.place as usize].key;
         let contacts = &self.contacts;
         let loss = self

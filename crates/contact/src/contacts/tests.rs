@@ -130,7 +130,7 @@ fn forces_on_the_nodes_are_the_force_at_the_point() {
     assert!((sum - force).length() < 1e-14);
     // Along the normal through the tool's point.
     assert!((moment - contact.point.cross(force)).length() < 1e-14);
-    let (on_tool, torque) = wrench_on_tool(&[contact], &[3.0], DVec3::ZERO);
+    let (on_tool, torque) = wrench_on_tool(&[contact], &[3.0 * contact.normal], DVec3::ZERO);
     assert!((on_tool + sum).length() < 1e-14 && (torque + moment).length() < 1e-14);
     assert!(place.shares().iter().any(|(_, weight)| *weight < 0.0));
 }
@@ -169,7 +169,8 @@ fn the_wrench_on_the_tool_is_minus_the_rows_times_the_forces() {
     };
     let contacts = [contact(1.0), contact(-4.0)];
     let reference = DVec3::new(0.5, 0.5, 0.5);
-    let (force, torque) = wrench_on_tool(&contacts, &[2.0, 3.0], reference);
+    let forces = [2.0 * contacts[0].normal, 3.0 * contacts[1].normal];
+    let (force, torque) = wrench_on_tool(&contacts, &forces, reference);
     for k in 0..3 {
         let rows = contacts.map(|p| p.tool_row(reference));
         assert_eq!(force[k], -(2.0 * rows[0][k] + 3.0 * rows[1][k]));

@@ -43,6 +43,7 @@ impl Engine {
             forces_frozen: vec![DVec3::ZERO; rows],
             q: vec![0.0; rows],
             forces: vec![0.0; rows],
+            on_part: Vec::with_capacity(rows),
             deviation: [0.0; 6],
             wrench: [0.0; 6],
             gaps: vec![0.0; rows],

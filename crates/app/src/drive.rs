@@ -4,6 +4,8 @@
 //! Where the force bends, steps are halved and the whole way is gone again, because the state at a place is that of the
 //! way there. In, a rest, and out again if asked for.
 
+mod friction;
+
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -15,10 +17,12 @@ use glamx::DPose3;
 use crate::engine::{Engine, StepReport};
 use crate::follow::Follower;
 use crate::prepare::{Demand, PreparedCompliance, PreparedPart};
+use crate::report::{self, DriveRow};
 use crate::scene::Scene;
 use crate::session::rates::ChosenRates;
-use crate::session::{Entry, Held, Recording, part_extent, refuse_overlap};
+use crate::session::{Entry, Held, Record, Recording, part_extent, refuse_overlap};
 use crate::{Error, interrupt, setup};
+pub(crate) use friction::Seen;
 
 /// Of the largest force, how far a force may be from the line between its neighbours: a peak is then known better.
 const BEND: f64 = 2e-3;
@@ -65,13 +69,75 @@ pub struct Driven {
     pub stopped_at: Option<f64>,
     /// How often the way was gone.
     pub n_rounds: u32,
+    /// Coulomb's coefficient, where friction is in it.
+    pub friction: Option<f64>,
+    /// By record: what part and springs hold, J.
+    pub stored: Vec<f64>,
+    /// The same way without friction, where friction is in this one.
+    pub frictionless: Option<Box<Driven>>,
 }
 
-/// Drives a scene's held body; with the engine as it is at the end.
+impl Driven {
+    /// The way without friction: itself, where there is none.
+    pub fn plain(&self) -> &Self {
+        self.frictionless.as_deref().unwrap_or(self)
+    }
+
+    /// Places of the way as a report is given them.
+    pub fn rows(&self) -> Vec<DriveRow> {
+        let recording = &self.recording;
+        let row = |(r, stored): (&Record, &f64)| DriveRow {
+            phase: match r.phase {
+                Phase::Approach => report::Phase::Approach,
+                Phase::Retract => report::Phase::Retract,
+                Phase::Hold | Phase::Done => report::Phase::Hold,
+            },
+            travel_m: r.travel,
+            force_n: recording.resistance(r) + 0.0,
+            sideways_m: r.sideways,
+            turn_rad: r.turn,
+            contacts: r.report.contacts,
+            sticking: r.report.sticking,
+            dissipated_j: r.report.dissipated,
+            stored_j: *stored,
+            is_converged: r.report.converged && r.report.lcp_solved && r.report.dropped == 0,
+            certificate: r.report.certificate,
+        };
+        recording
+            .records
+            .iter()
+            .zip(&self.stored)
+            .map(row)
+            .collect()
+    }
+}
+
+/// Drives a scene's held body; with the engine as it is at the end. With a coefficient of friction first without it, to see
+/// what friction would change; then with it, where that is much or the scene asks for it.
 ///
 /// # Errors
 /// A tool that overlaps the part at the start; an engine that refuses its settings; Ctrl-C.
 pub fn of_scene(
+    scene: &Scene,
+    prepared: &PreparedPart,
+    tool: Tool,
+    progress: &dyn fem::Progress,
+) -> Result<(Engine, Driven), Error> {
+    let plain = scene.with_friction(false);
+    let (engine, frictionless) = of_resolved(&plain, prepared, tool.clone(), progress)?;
+    if !friction::is_called_for(&scene.effects, &frictionless) {
+        return Ok((engine, frictionless));
+    }
+    let (engine, driven) = of_resolved(&scene.with_friction(true), prepared, tool, progress)?;
+    let driven = Driven {
+        frictionless: Some(Box::new(frictionless)),
+        ..driven
+    };
+    Ok((engine, driven))
+}
+
+/// As [`of_scene`] with friction on or off and not left open.
+fn of_resolved(
     scene: &Scene,
     prepared: &PreparedPart,
     tool: Tool,
@@ -84,7 +150,8 @@ pub fn of_scene(
     let rows = scene.accuracy.max_contacts.max(ROWS);
     let mut engine = setup::drive_engine(scene, prepared, tool, rows)?;
     let driven = run(&setup::drive(scene, held), prepared, &mut engine, progress)?;
-    Ok((engine, driven))
+    let friction = scene.effects.simulated_friction();
+    Ok((engine, Driven { friction, ..driven }))
 }
 
 /// Goes the way in and out.
@@ -120,6 +187,9 @@ pub fn run(
                 held: spec.held,
                 stopped_at: gone.stopped_at,
                 n_rounds,
+                friction: None,
+                stored: gone.stored,
+                frictionless: None,
             });
         }
     }
@@ -207,6 +277,8 @@ struct Gone {
     recording: Recording,
     /// By record: the travel that was asked for, m.
     asked: Vec<f64>,
+    /// By record, J.
+    stored: Vec<f64>,
     stopped_at: Option<f64>,
     /// m, place at which it could not be.
     met_at: f64,
@@ -227,6 +299,7 @@ impl Drive<'_> {
         let mut gone = Gone {
             recording: Recording::with_room(self.spec.direction, n, ChosenRates::driven()),
             asked: Vec::with_capacity(n),
+            stored: Vec::with_capacity(n),
             stopped_at: None,
             met_at: 0.0,
         };
@@ -282,8 +355,19 @@ impl Drive<'_> {
         let contacts = self.engine.active_contacts();
         gone.recording.push(&entry, held, &report, contacts);
         gone.asked.push(travel);
+        gone.stored.push(stored(self.engine, &report));
         report
     }
+}
+
+/// J, in the part, which answers linearly, and in the springs of a guide.
+fn stored(engine: &Engine, report: &StepReport) -> f64 {
+    let contacts = engine.active_contacts().iter();
+    let of_part = contacts.map(|c| {
+        let displacement = engine.displacement(c.candidate as usize);
+        0.5 * c.force_on_part.dot(displacement)
+    });
+    of_part.sum::<f64>() + engine.energy_of_guide(&report.contact_wrench_on_tool)
 }
 
 impl Gone {
@@ -291,6 +375,7 @@ impl Gone {
         // The first place stays, so that there is always one.
         if self.asked.len() > 1 {
             self.asked.pop();
+            self.stored.pop();
             self.recording.records.pop();
         }
     }

@@ -1,12 +1,84 @@
 //! Which physical effects a scene calls for: a number for each, a threshold, a verdict in words.
 //!
-//! This version simulates quasi-static, frictionless, small-displacement contact; every other
-//! effect is off and costs nothing, because there is no stage for it. What can be estimated from
-//! a run is estimated, so that a scene that would need an effect is told so.
+//! Each effect has a file: how it is estimated, from when on it matters, which key of `[effects]` decides, and which stage of
+//! the step simulates it. This version simulates friction; every other effect is off and costs nothing, because there is
+//! no stage for it. What can be estimated from a run is estimated, so that a scene that would need an effect is told so.
 
+mod collision;
+mod friction;
 mod ramp;
+mod rotation;
+mod unseen;
 
 pub use ramp::Ramp;
+
+/// A physical effect beyond the quasi-static, frictionless model of small displacements.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Effect {
+    /// Coulomb friction between part and tool.
+    Friction,
+    /// Rotation of the part's arms beyond linear elasticity.
+    LargeRotation,
+    /// Tool motion within one step.
+    ContinuousCollision,
+    /// Weight of the part.
+    Gravity,
+    /// Mass of the tool.
+    ToolInertia,
+    /// Mass of the part.
+    PartInertia,
+    /// Damping of the part.
+    Damping,
+    /// Elasticity of the tool.
+    DeformableTool,
+}
+
+impl Effect {
+    /// All, in the order in which they are told.
+    pub const ALL: [Self; 8] = [
+        Self::Friction,
+        Self::LargeRotation,
+        Self::ContinuousCollision,
+        Self::Gravity,
+        Self::ToolInertia,
+        Self::PartInertia,
+        Self::Damping,
+        Self::DeformableTool,
+    ];
+
+    /// Its key in `[effects]`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Friction => "friction",
+            Self::LargeRotation => "large_rotation",
+            Self::ContinuousCollision => "continuous_collision",
+            Self::Gravity => "gravity",
+            Self::ToolInertia => "tool_inertia",
+            Self::PartInertia => "part_inertia",
+            Self::Damping => "damping",
+            Self::DeformableTool => "deformable_tool",
+        }
+    }
+
+    /// Whether a stage of the step simulates it.
+    pub fn is_simulated(self) -> bool {
+        self == Self::Friction
+    }
+
+    /// What a run without it says of it.
+    pub fn judge(self, observed: &Observed) -> Verdict {
+        match self {
+            Self::Friction => friction::judge(observed),
+            Self::LargeRotation => rotation::judge(observed),
+            Self::ContinuousCollision => collision::judge(observed),
+            Self::Gravity
+            | Self::ToolInertia
+            | Self::PartInertia
+            | Self::Damping
+            | Self::DeformableTool => unseen::judge(self),
+        }
+    }
+}
 
 /// What a run showed, as far as the estimators need it.
 #[derive(Clone, Debug, Default)]
@@ -29,8 +101,8 @@ pub struct Observed {
 /// Verdict on one effect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verdict {
-    /// Name as in `[effects]` of a scene.
-    pub name: &'static str,
+    /// Which effect.
+    pub effect: Effect,
     /// Whether it is simulated.
     pub on: bool,
     /// Estimate of what it would change, if one could be made.
@@ -45,257 +117,37 @@ pub struct Verdict {
     pub missing: bool,
 }
 
+impl Verdict {
+    /// Off, not called for, without a number.
+    fn quiet(effect: Effect, why: String) -> Self {
+        Self {
+            effect,
+            on: false,
+            number: None,
+            added_on_the_way_out: None,
+            threshold: FORCE_TOLERANCE,
+            why,
+            missing: false,
+        }
+    }
+}
+
 /// Share of the felt force that a missing effect may change before it is called for.
 const FORCE_TOLERANCE: f64 = 0.1;
-/// Degrees. Beyond it linear strains of a rotated arm are no longer small beside the true ones.
-const ROTATION_LIMIT_DEG: f64 = 10.0;
-/// Motion per period over feature size from which a tool could pass through unseen.
-const TUNNELLING_LIMIT: f64 = 0.5;
 
 /// All effects of a scene with their numbers.
 pub fn judge(observed: &Observed) -> Vec<Verdict> {
-    let rotation = observed.max_rotation.to_degrees();
-    let quiet = |name, why: &str| Verdict {
-        name,
-        on: false,
-        number: None,
-        added_on_the_way_out: None,
-        threshold: FORCE_TOLERANCE,
-        why: why.to_owned(),
-        missing: false,
-    };
-    vec![
-        friction(observed),
-        Verdict {
-            name: "large_rotation",
-            on: false,
-            number: Some(rotation),
-            added_on_the_way_out: None,
-            threshold: ROTATION_LIMIT_DEG,
-            why: format!(
-                "material points turn by up to {rotation:.1} degrees; {}",
-                if rotation > ROTATION_LIMIT_DEG {
-                    "small-displacement theory is too stiff here, expect a peak some percent too high"
-                } else {
-                    "small-displacement theory holds"
-                }
-            ),
-            missing: rotation > ROTATION_LIMIT_DEG,
-        },
-        Verdict {
-            name: "continuous_collision",
-            on: false,
-            number: Some(observed.motion_per_feature),
-            added_on_the_way_out: None,
-            threshold: TUNNELLING_LIMIT,
-            why: format!(
-                "in the hand's run the tool moves at most {:.2} of the smallest feature in a period{}",
-                observed.motion_per_feature,
-                if observed.motion_per_feature > TUNNELLING_LIMIT {
-                    "; write a lower hand.speed, a stiffer hand.stiffness that does not jump, or a shorter \
-                     device.servo_period (the part's own curve has no such steps)"
-                } else {
-                    ""
-                }
-            ),
-            missing: observed.motion_per_feature > TUNNELLING_LIMIT,
-        },
-        quiet(
-            "gravity",
-            "not estimated; weight of part and tool is left out",
-        ),
-        quiet(
-            "tool_inertia",
-            "not estimated; the tool follows its coupling without mass",
-        ),
-        quiet(
-            "part_inertia",
-            "not estimated; the part answers quasi-statically",
-        ),
-        quiet(
-            "damping",
-            "not estimated; only of interest with part inertia",
-        ),
-        quiet("deformable_tool", "not estimated; the tool is rigid"),
-    ]
-}
-
-/// F grows from tan(a) to tan(a + phi) on a face of angle a, with phi = atan(mu).
-fn friction(observed: &Observed) -> Verdict {
-    let ramp = &observed.ramp;
-    let verdict = |number: Option<f64>, missing: bool, why: String| Verdict {
-        name: "friction",
-        on: false,
-        number,
-        added_on_the_way_out: None,
-        threshold: FORCE_TOLERANCE,
-        why,
-        missing,
-    };
-    let Some(angle) = ramp.angle() else {
-        return verdict(None, false, "nothing touched".to_owned());
-    };
-    let degrees = angle.to_degrees();
-    if ramp.is_head_on() && !observed.has_passed {
-        let why = format!(
-            "the body is stopped head on ({degrees:.0} degrees), there is no ramp to rub on"
-        );
-        return verdict(None, false, why);
-    }
-    let Some(mu) = observed.friction_coefficient else {
-        let from = ramp.coefficient_for(FORCE_TOLERANCE);
-        return verdict(None, false, without_coefficient(ramp, from));
-    };
-    let phi = mu.atan().to_degrees();
-    let Some(added) = ramp.friction(mu) else {
-        let why = format!(
-            "self-locking: the ramp of {degrees:.1} degrees and friction's angle of {phi:.1} make 90 or more, so no push \
-             gets the body over; make the ramp flatter than {:.1} degrees",
-            90.0 - phi
-        );
-        return verdict(None, true, why);
-    };
-    let out = on_the_way_out(observed, mu);
-    let locks_out = observed.release.as_ref().is_some_and(|r| r.locks(mu));
-    if ramp.is_level() {
-        let why = format!(
-            "the ramp is level at the peak ({degrees:.1} degrees): friction would add {added:.3} N to {:.3} N there, \
-             mu times what presses{out}",
-            ramp.along()
-        );
-        let matters = added > FORCE_TOLERANCE * ramp.along().abs();
-        return verdict(None, matters || locks_out, why);
-    }
-    let share = added / ramp.along();
-    let why = format!(
-        "would raise the force at the peak by about {:.0} %, by {added:.3} N: tan(a + phi)/tan(a) with a ramp of \
-         {degrees:.1} degrees and friction's angle of {phi:.1}{out}",
-        100.0 * share
-    );
-    let release = observed.release.as_ref();
-    Verdict {
-        added_on_the_way_out: release.and_then(|release| release.friction(mu)),
-        ..verdict(Some(share), share > FORCE_TOLERANCE || locks_out, why)
-    }
-}
-
-fn without_coefficient(ramp: &Ramp, from: Option<f64>) -> String {
-    const ASK: &str = "state friction_coefficient in [effects] to have it judged";
-    match from.filter(|_| !ramp.is_level()) {
-        Some(mu) => format!("matters from a coefficient of {mu:.3} on at this ramp; {ASK}"),
-        None => format!("the ramp is level at the peak, any friction matters there; {ASK}"),
-    }
-}
-
-/// What friction does to the pull out, after a comma; nothing where no flank was seen.
-fn on_the_way_out(observed: &Observed, mu: f64) -> String {
-    let Some((release, angle)) = observed
-        .release
-        .as_ref()
-        .and_then(|r| r.angle().map(|a| (r, a)))
-    else {
-        return String::new();
-    };
-    let (degrees, phi) = (angle.to_degrees(), mu.atan().to_degrees());
-    match release.friction(mu) {
-        None => format!(
-            "; on the way out the flank of {degrees:.1} degrees is self-locking with it: no pull gets the body out"
-        ),
-        Some(added) if degrees > 0.0 && degrees < phi => format!(
-            "; on the way out {added:.3} N, and the back flank of {degrees:.1} degrees is flatter than friction's angle, \
-             so the part does not draw the body home by itself"
-        ),
-        Some(added) => format!("; on the way out by {added:.3} N"),
-    }
+    Effect::ALL.map(|effect| effect.judge(observed)).to_vec()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// A run on a ramp of so many degrees that is pressed with a newton.
-    fn on_ramp(degrees: f64, mu: f64) -> Observed {
-        Observed {
-            ramp: Ramp::face(degrees.to_radians(), 1.0),
-            friction_coefficient: Some(mu),
-            has_passed: true,
-            ..Observed::default()
-        }
-    }
-
     #[test]
-    fn friction_is_called_for_from_0_0423_on_at_a_ramp_of_30_degrees() {
-        // tan(30 deg + atan mu) = 1.1 tan 30 deg at mu = 0.0423.
-        let missing = |mu| judge(&on_ramp(30.0, mu))[0].missing;
-        assert!(!missing(0.0422));
-        assert!(missing(0.0424));
-    }
-
-    #[test]
-    fn friction_is_the_handbooks_factor_and_told_in_newtons() {
-        let verdict = &judge(&on_ramp(30.0, 0.6))[0];
-        // tan(30 + 30.964) / tan 30 - 1, where 2 mu / sin 60 would be 1.386.
-        assert!(
-            (verdict.number.unwrap() - 2.1210).abs() < 1e-3,
-            "{verdict:?}"
-        );
-        assert!(
-            verdict.why.contains("by about 212 %, by 1.060 N"),
-            "{}",
-            verdict.why
-        );
-    }
-
-    #[test]
-    fn a_level_ramp_is_told_in_newtons_and_not_in_percent() {
-        for degrees in [-5.0, 0.0, 0.02, 0.9] {
-            let verdict = &judge(&on_ramp(degrees, 0.2))[0];
-            assert!(verdict.number.is_none() && verdict.missing, "{verdict:?}");
-            assert!(verdict.why.contains("level at the peak"), "{}", verdict.why);
-            assert!(!verdict.why.contains('%'), "{}", verdict.why);
-        }
-        assert!(judge(&on_ramp(1.1, 0.2))[0].number.is_some());
-    }
-
-    #[test]
-    fn self_locking_is_flagged_on_the_way_in_and_out() {
-        // atan 0.6 = 30.96 degrees.
-        let locks = |degrees| {
-            judge(&on_ramp(degrees, 0.6))[0]
-                .why
-                .contains("self-locking")
-        };
-        assert!(!locks(59.0));
-        assert!(locks(59.1));
-        let out = |degrees: f64, mu: f64| {
-            let observed = Observed {
-                release: Some(Ramp::face(degrees.to_radians(), 1.0)),
-                ..on_ramp(30.0, mu)
-            };
-            judge(&observed)[0].clone()
-        };
-        assert!(!out(59.0, 0.6).why.contains("self-locking"));
-        let locked = out(59.1, 0.6);
-        assert!(locked.missing && locked.why.contains("no pull gets the body out"));
-        // A vertical back holds without friction too.
-        assert!(out(90.0, 0.01).missing);
-        assert!(out(30.0, 0.6).why.contains("does not draw the body home"));
-        assert!(!out(31.0, 0.6).why.contains("does not draw the body home"));
-    }
-
-    #[test]
-    fn what_is_stopped_head_on_does_not_call_for_friction() {
-        let mut observed = on_ramp(88.0, 0.3);
-        observed.has_passed = false;
-        let verdict = &judge(&observed)[0];
-        assert!(
-            !verdict.missing && verdict.why.contains("head on"),
-            "{verdict:?}"
-        );
-    }
-
-    #[test]
-    fn nothing_is_claimed_to_be_simulated() {
-        assert!(judge(&Observed::default()).iter().all(|v| !v.on));
+    fn nothing_is_claimed_to_be_simulated_by_an_estimate() {
+        let all = judge(&Observed::default());
+        assert!(all.iter().all(|v| !v.on && !v.missing));
+        assert!(all.iter().map(|v| v.effect).eq(Effect::ALL));
     }
 }

@@ -125,6 +125,11 @@ impl Engine {
         self.near.sites.is_some()
     }
 
+    /// Whether there is friction between part and tool.
+    pub fn has_friction(&self) -> bool {
+        matches!(self.law, Law::Coulomb(_))
+    }
+
     /// m: nodes farther from the tool than this, beyond those that get a contact, can carry none of its force.
     pub fn reach_between_nodes(&self) -> f64 {
         let of_sites = self.near.sites.as_ref().map_or(0.0, |s| s.largest_face());

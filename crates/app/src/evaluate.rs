@@ -12,15 +12,15 @@ use glam::DVec3;
 use crate::Error;
 use crate::between::BetweenNodes;
 use crate::choice::Why;
-use crate::drive::Driven;
-use crate::effects::{Observed, Ramp, Verdict, judge};
+use crate::drive::{Driven, Seen};
+use crate::effects::{self, Observed, Verdict, judge};
 use crate::elsewhere::Elsewhere;
 use crate::engine::{Engine, Stage};
 use crate::fields::FieldSolver;
 use crate::machine::Machine;
 use crate::prepare::PreparedPart;
 use crate::report::{
-    self, ContactForce, Doubts, DriveRow, Effect, Facts, Frame, Limits, MultiplyFacts,
+    self, ContactForce, Doubts, Effect, Facts, Frame, FrictionFacts, Limits, MultiplyFacts,
     MultiplyRace, Origin, Outputs, PaperStage, PartCurve, Phase, RateFacts, Run, StepRow,
     StrainFacts, TwoRateFacts, View, Viewing, Warning,
 };
@@ -70,7 +70,7 @@ impl Story<'_> {
         } = self;
         let recording = &self.driven.recording;
         let solver = FieldSolver::new(prepared, progress)?;
-        let part_curve = PartCurve::of(&self.drive_rows());
+        let part_curve = PartCurve::of(&self.driven.rows());
         let snap = part_curve.snap().map(|snap| snap.row_idx);
         let moments = Moments::of(recording, snap);
         let mut between = BetweenNodes::new(prepared, self.engine);
@@ -89,9 +89,10 @@ impl Story<'_> {
         let (frames, drawn_rotation) = self.frames(&solver, &moments, strained.index);
         let max_rotation = strained.max_rotation.max(drawn_rotation);
         self.remarks.extend(strained.facts.remarks());
-        let verdicts: Vec<Verdict> = judge(&self.observed(&moments, max_rotation))
+        let verdicts: Vec<Verdict> = judge(&self.observed(max_rotation))
             .into_iter()
-            .filter(|v| choice(scene, v.name) == EffectChoice::Auto || v.missing)
+            .map(|verdict| self.as_simulated(verdict, &part_curve))
+            .filter(|v| choice(scene, v.effect) == EffectChoice::Auto || v.missing)
             .collect();
         let way = recording.records.iter().map(|r| r.travel);
         let way = way.fold(0.0, f64::max);
@@ -116,7 +117,11 @@ impl Story<'_> {
         warnings.extend(elsewhere);
         warnings.extend(part_curve.ends_in_the_fall());
         warnings.extend(self.stopped());
-        warnings.extend(verdicts.iter().filter_map(words::called_for));
+        warnings.extend(
+            verdicts
+                .iter()
+                .filter_map(|v| words::called_for(v, choice(scene, v.effect))),
+        );
         warnings.extend(self.troubles());
         let felt = self.felt.map(|felt| felt.recording);
         let rows: Vec<StepRow> = felt.map_or_else(Vec::new, |felt| {
@@ -136,7 +141,7 @@ impl Story<'_> {
             ]
             .concat(),
             facts: self.facts(&strained.facts, max_rotation),
-            handbook: handbook::beside(scene, recording, strained.facts.value()),
+            handbook: handbook::beside(scene, self.driven, strained.facts.value()),
             strain: strained.facts,
             paper: paper(&rows),
             driven: Some(driven),
@@ -206,22 +211,6 @@ impl Story<'_> {
         }
     }
 
-    /// The driven curve as the report is given it.
-    fn drive_rows(&self) -> Vec<DriveRow> {
-        let recording = &self.driven.recording;
-        let row = |r: &Record| DriveRow {
-            phase: phase(r),
-            travel_m: r.travel,
-            force_n: recording.resistance(r) + 0.0,
-            sideways_m: r.sideways,
-            turn_rad: r.turn,
-            contacts: r.report.contacts,
-            is_converged: r.report.converged && r.report.lcp_solved && r.report.dropped == 0,
-            certificate: r.report.certificate,
-        };
-        recording.records.iter().map(row).collect()
-    }
-
     /// The driven curve with its verdict. `others`: what makes it another than the part's, besides missing effects.
     fn judged(
         &self,
@@ -232,12 +221,15 @@ impl Story<'_> {
         // What the scene leaves out on purpose is told, and the curve is complete without it. No step of the drive goes
         // through anything: that is a matter of the hand.
         let counts = |v: &&Verdict| {
-            choice(self.scene, v.name) == EffectChoice::Auto && v.name != "continuous_collision"
+            choice(self.scene, v.effect) == EffectChoice::Auto
+                && v.effect != effects::Effect::ContinuousCollision
         };
         let missing = || effects.iter().filter(counts);
-        let friction = missing().find(|v| v.missing && v.name == "friction");
+        let friction = missing().find(|v| v.missing && v.effect == effects::Effect::Friction);
         let doubts = Doubts {
-            missing_effects: missing().filter_map(words::called_for).collect(),
+            missing_effects: missing()
+                .filter_map(|v| words::called_for(v, choice(self.scene, v.effect)))
+                .collect(),
             friction_share: friction.and_then(|v| v.number),
             friction_out_n: friction.and_then(|v| v.added_on_the_way_out),
             others,
@@ -252,7 +244,12 @@ impl Story<'_> {
                 scene::StrainUse::Repeatedly => report::StrainUse::Repeatedly,
             },
         };
-        report::Driven::of(self.drive_rows(), &doubts, &limits, strain)
+        let driven = report::Driven::of(self.driven.rows(), &doubts, &limits, strain);
+        let source = &self.scene.effects.friction_source;
+        let friction = self.driven.friction.map(|coefficient| {
+            FrictionFacts::of(coefficient, source.clone(), self.driven.plain().rows())
+        });
+        report::Driven { friction, ..driven }
     }
 
     fn row(&self, felt: &Recording, record: &Record) -> StepRow {
@@ -298,6 +295,7 @@ impl Story<'_> {
                     node,
                     point: rest + displacement[node as usize],
                     force: c.force_on_part,
+                    sticks: c.sticks,
                 }
             })
             .collect();
@@ -317,7 +315,18 @@ impl Story<'_> {
         }
     }
 
-    fn observed(&self, moments: &Moments, max_rotation: f64) -> Observed {
+    /// What an effect that is simulated has changed, in place of what was expected of it.
+    fn as_simulated(&self, verdict: Verdict, curve: &PartCurve) -> Verdict {
+        match self.driven.friction {
+            Some(mu) if verdict.effect == effects::Effect::Friction => {
+                let plain = PartCurve::of(&self.driven.plain().rows());
+                words::friction_in(verdict, mu, curve, &plain)
+            }
+            _ => verdict,
+        }
+    }
+
+    fn observed(&self, max_rotation: f64) -> Observed {
         // Nothing runs through anything where the steps are those of the way itself.
         let felt = self.felt.map_or(&[][..], |felt| &felt.recording.records);
         let fastest = felt
@@ -328,7 +337,11 @@ impl Story<'_> {
             .fold(0.0, f64::max);
         let feature = drawing::shortest_edge(&self.prepared.loaded.mesh)
             .min(self.engine.tool().characteristic_size());
-        let (ramp, release, has_passed) = self.ramps(moments);
+        let Seen {
+            ramp,
+            release,
+            has_passed,
+        } = Seen::of(self.driven.plain());
         Observed {
             max_rotation,
             ramp,
@@ -337,26 +350,6 @@ impl Story<'_> {
             friction_coefficient: self.scene.effects.friction_coefficient,
             motion_per_feature: fastest / feature,
         }
-    }
-
-    /// What the body slides on at the peak, what it comes back over, and whether it went past the peak.
-    fn ramps(&self, moments: &Moments) -> (Ramp, Option<Ramp>, bool) {
-        let recording = &self.driven.recording;
-        let records = &recording.records;
-        // Contacts are in the part's frame, where a held part stands still and the tool comes.
-        let way = self.driven.held.way_of_tool(recording.direction);
-        let at = |i: usize| Ramp::of(recording.contacts(&records[i]), way);
-        let force = |i: usize| recording.resistance(&records[i]);
-        let Some(peak) = moments.peak else {
-            return (Ramp::default(), None, false);
-        };
-        let has_passed = moments.crest.is_some();
-        // The hardest pull towards home, on the way in or out: that is the flank of the way out.
-        let release = (peak..records.len())
-            .min_by(|&a, &b| force(a).total_cmp(&force(b)))
-            .filter(|&i| force(i) < 0.0)
-            .map(|i| at(i).reversed());
-        (at(peak), release, has_passed)
     }
 }
 
@@ -370,7 +363,7 @@ fn phase(record: &Record) -> Phase {
 
 fn effect(verdict: Verdict) -> Effect {
     Effect {
-        name: verdict.name.to_owned(),
+        name: verdict.effect.name().to_owned(),
         on: verdict.on,
         number: verdict.number,
         threshold: verdict.threshold,
@@ -420,17 +413,18 @@ fn rate_facts(recording: &Recording) -> RateFacts {
     }
 }
 
-fn choice(scene: &Scene, effect: &str) -> EffectChoice {
+fn choice(scene: &Scene, effect: effects::Effect) -> EffectChoice {
+    use effects::Effect;
     let e = &scene.effects;
     match effect {
-        "friction" => e.friction,
-        "large_rotation" => e.large_rotation,
-        "gravity" => e.gravity,
-        "tool_inertia" => e.tool_inertia,
-        "part_inertia" => e.part_inertia,
-        "damping" => e.damping,
-        "continuous_collision" => e.continuous_collision,
-        _ => e.deformable_tool,
+        Effect::Friction => e.friction,
+        Effect::LargeRotation => e.large_rotation,
+        Effect::Gravity => e.gravity,
+        Effect::ToolInertia => e.tool_inertia,
+        Effect::PartInertia => e.part_inertia,
+        Effect::Damping => e.damping,
+        Effect::ContinuousCollision => e.continuous_collision,
+        Effect::DeformableTool => e.deformable_tool,
     }
 }
 

@@ -109,7 +109,7 @@ pub(crate) fn after(
     warnings.extend(order::checked(
         scene,
         ran.prepared,
-        track.peak_force,
+        Track::of_drive(scene, &ran.driven.plain().recording).peak_force,
         options,
     )?);
     Ok(warnings)

@@ -27,9 +27,9 @@ use std::path::{Path, PathBuf};
 
 pub use curve::Curve;
 pub use data::{
-    CellKind, ContactForce, DriveRow, Driven, Effect, Facts, Frame, Handbook, HandbookRow,
-    MultiplyFacts, MultiplyRace, N_STAGES, Outputs, PaperStage, PartDrawing, Phase, RateFacts, Run,
-    STAGE_NAMES, StepRow, TwoRateFacts, View, Viewing, Warning,
+    CellKind, ContactForce, DriveRow, Driven, Effect, Facts, Frame, FrictionFacts, Handbook,
+    HandbookRow, MultiplyFacts, MultiplyRace, N_STAGES, Outputs, PaperStage, PartDrawing, Phase,
+    RateFacts, Run, STAGE_NAMES, StepRow, TwoRateFacts, View, Viewing, Warning,
 };
 pub use error::ReportError;
 pub use origin::{InputFile, Origin};

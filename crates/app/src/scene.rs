@@ -18,6 +18,7 @@ mod device;
 mod drive;
 mod effects;
 mod error;
+mod friction;
 mod hand;
 pub mod handbook;
 mod holds;
@@ -173,6 +174,18 @@ impl Scene {
         keys.checked(source, path)
     }
 
+    /// The same scene with or without friction, whatever it changes.
+    #[must_use]
+    pub fn with_friction(&self, is_on: bool) -> Self {
+        let mut scene = self.clone();
+        scene.effects.friction = if is_on {
+            EffectChoice::On
+        } else {
+            EffectChoice::Off
+        };
+        scene
+    }
+
     /// The error for a group that the mesh does not have, naming the nearest of `known`.
     pub fn unknown_group<'a>(
         &self,
@@ -232,7 +245,8 @@ struct SceneKeys {
     #[serde(default)]
     accuracy: accuracy::WordOrKeys,
     /// Effects beyond the small-strain, frictionless, quasi-static model. `"off"`: left out on purpose; it is told if it would matter, and the verdict stands without it.
-    /// `"auto"`: its size is estimated and told. `"on"`: simulated, which this version cannot.
+    /// `"auto"`: its size is estimated and told, and friction is simulated if it matters. `"on"`: simulated, which this
+    /// version does for friction only.
     #[serde(default)]
     effects: effects::EffectsKeys,
     /// Which results are written.
@@ -258,6 +272,9 @@ impl SceneKeys {
         let (drive, hand) = drive::motion(self.drive.as_ref(), self.hand.as_ref(), &device, check)?;
         let order = accuracy.order(self.part.order, check)?;
         let part = self.part.checked(order, check)?;
+        let effects = self
+            .effects
+            .checked(tool.friction(&part.material, check)?, check)?;
         let handbook = self
             .handbook
             .map(|handbook| handbook.checked(tool, &part.material, check));
@@ -284,7 +301,7 @@ impl SceneKeys {
             coupling: self.coupling.checked(check)?,
             accuracy: accuracy.checked(device.servo_period, check)?,
             device,
-            effects: self.effects.checked(check)?,
+            effects,
             output: self.output.checked(check)?,
         };
         // The checks borrowed the text for its lines until here.

@@ -276,6 +276,7 @@ fn plan(
     let grip = held(scene, prepared, &tool).engine_grip();
     let plan = Plan {
         grip,
+        friction: scene.effects.simulated_friction(),
         ..Plan::new(prepared.contact_part(), tool, coupling, settings)
     };
     with_contact(scene, prepared, plan)

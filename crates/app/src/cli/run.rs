@@ -57,7 +57,8 @@ pub(super) fn run(args: &RunArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u8
     let origin = crate::origin::read(&scene, Some(prepared.loaded.mesh_hash))?;
     let progress = ui.progress();
     let (engine, driven) = drive::of_scene(&scene, &prepared, tool.clone(), &progress)?;
-    let felt = feel(&scene, args, &prepared, tool, &options, ui)?;
+    let decided = scene.with_friction(driven.friction.is_some());
+    let felt = feel(&decided, args, &prepared, tool, &options, ui)?;
     let ran = plausibility::Ran {
         prepared: &prepared,
         engine: &engine,

@@ -98,6 +98,7 @@ mod tests {
             candidate: 0,
             normal_force: force.length(),
             force_on_part: force,
+            sticks: false,
         }
     }
 

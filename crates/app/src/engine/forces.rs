@@ -38,27 +38,29 @@ impl Loads {
 
     /// Adds a force at a place: along the normal, and in all, N.
     #[inline]
-    pub(super) fn add(&mut self, place: &Place, normal_force: f64, on_part: DVec3) {
+    pub(super) fn add(&mut self, place: &Place, normal_force: f64, on_part: DVec3, sticks: bool) {
         for &(candidate, share) in place.shares() {
-            self.load(candidate, share * normal_force, share * on_part);
+            self.load(ActiveContact {
+                candidate,
+                normal_force: share * normal_force,
+                force_on_part: share * on_part,
+                sticks,
+            });
         }
     }
 
-    /// Adds to what a node carries, N.
+    /// Adds to what a node carries.
     #[inline]
-    fn load(&mut self, candidate: u32, normal_force: f64, on_part: DVec3) {
-        let place = &mut self.place_of[candidate as usize];
+    fn load(&mut self, more: ActiveContact) {
+        let place = &mut self.place_of[more.candidate as usize];
         if let Some(contact) = self.active.get_mut(*place as usize) {
-            contact.normal_force += normal_force;
-            contact.force_on_part += on_part;
+            contact.normal_force += more.normal_force;
+            contact.force_on_part += more.force_on_part;
+            contact.sticks &= more.sticks;
             return;
         }
         *place = self.active.len() as u32;
-        self.active.push(ActiveContact {
-            candidate,
-            normal_force,
-            force_on_part: on_part,
-        });
+        self.active.push(more);
     }
 
     #[inline]
@@ -126,12 +128,7 @@ impl Forces {
                     continue;
                 }
             }
-            let ActiveContact {
-                candidate,
-                normal_force,
-                force_on_part,
-            } = ahead;
-            self.ahead.load(candidate, normal_force, force_on_part);
+            self.ahead.load(ahead);
         }
         std::mem::swap(&mut self.before, &mut self.loads);
         std::mem::swap(&mut self.loads, &mut self.ahead);
@@ -150,14 +147,14 @@ impl Forces {
     /// Makes the forces of these contacts the state. Does not allocate.
     pub(super) fn adopt(&mut self, places: &[Place], contacts: &[Contact], forces: &ByContact) {
         self.forget();
-        let forces = forces.normal.iter().zip(&forces.on_part);
-        for (contact, (&force, &on_part)) in contacts.iter().zip(forces) {
+        for (i, contact) in contacts.iter().enumerate() {
+            let (force, on_part) = (forces.normal[i], forces.on_part[i]);
             if force > 0.0 {
                 let place = &places[contact.place as usize];
                 self.is_carried[place.key as usize] = true;
                 self.carried.push((place.key, force));
                 self.carried_at.push(contact.place);
-                self.loads.add(place, force, on_part);
+                self.loads.add(place, force, on_part, forces.sticks[i]);
             }
         }
     }
@@ -233,8 +230,7 @@ impl State {
     pub(super) fn copy_from(&mut self, forces: &Forces) {
         self.loads.clear();
         for now in &forces.loads.active {
-            self.loads
-                .load(now.candidate, now.normal_force, now.force_on_part);
+            self.loads.load(*now);
         }
         self.known.forget();
     }

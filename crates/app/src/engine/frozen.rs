@@ -262,7 +262,7 @@ impl FrozenProblem {
             self.on_part.push(on_part);
             if force > 0.0 {
                 report.contacts += 1;
-                self.loads.add(place, force, on_part);
+                self.loads.add(place, force, on_part, false);
             }
         }
         let (force, torque) = wrench_on_tool(&self.contacts, &self.on_part, self.reference);

@@ -21,6 +21,8 @@ pub(super) struct ByContact {
     pub(super) normal: Vec<f64>,
     /// On the part, part's frame.
     pub(super) on_part: Vec<DVec3>,
+    /// Whether each sticks; with friction only.
+    pub(super) sticks: Vec<bool>,
 }
 
 impl ByContact {
@@ -28,6 +30,7 @@ impl ByContact {
         Self {
             normal: vec![0.0; max_near],
             on_part: vec![DVec3::ZERO; max_near],
+            sticks: vec![false; max_near],
         }
     }
 

@@ -53,6 +53,8 @@ pub struct ActiveContact {
     pub normal_force: f64,
     /// N, part frame: the same along each normal, and with friction across it.
     pub force_on_part: DVec3,
+    /// Whether it sticks to the tool; false without friction, and where one of its contacts slips.
+    pub sticks: bool,
 }
 
 /// Result of one step. Wrenches are `[force N, torque N m]` in the part's frame, about the tool's

@@ -1,23 +1,29 @@
 //! The formulas' numbers beside the computed ones.
 
+use crate::drive::Driven;
 use crate::report::{Handbook, HandbookRow};
 use crate::scene::Scene;
 use crate::scene::handbook::Measured;
 use crate::session::{Record, Recording};
 
-/// What `[handbook]` says, if the scene has one. `driven`: the part's own curve; `strain`: the largest
-/// principal one.
-pub(super) fn beside(scene: &Scene, driven: &Recording, strain: f64) -> Option<Handbook> {
-    let prediction = scene.handbook.as_ref()?.predict(&scene.part.material);
+/// What `[handbook]` says, if the scene has one. Its formulas are without friction, and so is the curve that they stand
+/// beside, unless they say otherwise. `strain`: the largest principal one.
+pub(super) fn beside(scene: &Scene, ways: &Driven, strain: f64) -> Option<Handbook> {
+    let friction = ways.friction.unwrap_or(0.0);
+    let handbook = scene.handbook.as_ref()?;
+    let prediction = handbook.predict(&scene.part.material, friction);
+    let driven = &ways.plain().recording;
     let records = &driven.records;
     let largest = |of: &dyn Fn(&Record) -> f64| records.iter().map(of).fold(0.0, f64::max);
     let is_way_out = |r: &Record| r.phase == device::Phase::Retract;
     let pulls_out = records.iter().any(is_way_out);
+    let insertion = |of: &Recording| {
+        let way_in = of.records.iter().filter(|r| !is_way_out(r));
+        Some(way_in.map(|r| of.resistance(r)).fold(0.0, f64::max))
+    };
     let measured = |what| match what {
-        Measured::Insertion => Some(largest(&|r| match is_way_out(r) {
-            true => 0.0,
-            false => driven.resistance(r),
-        })),
+        Measured::Insertion => insertion(driven),
+        Measured::InsertionWithFriction => insertion(&ways.recording),
         // Resistance to the way out pulls along the way in.
         Measured::Removal => pulls_out.then(|| {
             largest(&|r| match is_way_out(r) {

@@ -4,7 +4,9 @@ use super::Story;
 use crate::effects::Verdict;
 use crate::prepare::PreparedCompliance;
 use crate::prepare::budget::bytes;
-use crate::scene::{Guide, ToolShape};
+use crate::report::PartCurve;
+use crate::report::part_curve::Place;
+use crate::scene::{EffectChoice, Guide, ToolShape};
 use crate::session::{Record, Recording};
 
 impl Story<'_> {
@@ -234,9 +236,14 @@ impl Story<'_> {
             "The part's own curve is that of a testing machine: the held body goes along its path rigidly, and contact is \
              solved for in each place from the one before."
                 .to_owned(),
-            "Contact is frictionless and quasi-static, displacements are linear; strain is recovered at the skin \
-             (superconvergent patch recovery), rotation is the largest at the integration points."
-                .to_owned(),
+            format!(
+                "Contact is {} and quasi-static, displacements are linear; strain is recovered at the skin (superconvergent \
+                 patch recovery), rotation is the largest at the integration points.",
+                match self.driven.friction {
+                    None => "frictionless".to_owned(),
+                    Some(mu) => format!("with Coulomb's friction (coefficient {mu}, exact cone)"),
+                }
+            ),
         ];
         if self.felt.is_some() {
             notes.push(
@@ -268,18 +275,53 @@ impl Story<'_> {
 }
 
 /// An effect that the scene calls for and that is left out, in a sentence with its number.
-pub(super) fn called_for(verdict: &Verdict) -> Option<String> {
+pub(super) fn called_for(verdict: &Verdict, choice: EffectChoice) -> Option<String> {
     let number = verdict
         .number
         .map(|n| format!(" ({n:.2} beyond {:.2})", verdict.threshold));
+    let leaves_out = match choice {
+        EffectChoice::Off if verdict.effect.is_simulated() => "[effects] leaves out",
+        _ => "this version does not simulate",
+    };
     verdict.missing.then(|| {
         format!(
-            "this scene calls for {}, which this version does not simulate{}: {}",
-            verdict.name.replace('_', " "),
+            "this scene calls for {}, which {leaves_out}{}: {}",
+            verdict.effect.name().replace('_', " "),
             number.unwrap_or_default(),
             verdict.why
         )
     })
+}
+
+/// Friction that is in the curve: what it changed, beside what was expected.
+pub(super) fn friction_in(
+    expected: Verdict,
+    coefficient: f64,
+    curve: &PartCurve,
+    plain: &PartCurve,
+) -> Verdict {
+    let change = |name: &str, with: Option<Place>, without: Option<Place>| {
+        let (with, without) = (with?.force_n, without?.force_n);
+        let percent = 100.0 * (with / without - 1.0);
+        (without > 0.0).then(|| format!(" {name} {with:.3} N for {without:.3} N ({percent:+.0} %)"))
+    };
+    let parts = [
+        change("in", curve.insertion(), plain.insertion()),
+        change("out", curve.removal.peak(), plain.removal.peak()),
+    ];
+    let parts: Vec<String> = parts.into_iter().flatten().collect();
+    let estimate = expected.number.map_or_else(String::new, |share| {
+        format!("; {:+.0} % in was expected of the ramp", 100.0 * share)
+    });
+    Verdict {
+        on: true,
+        missing: false,
+        why: format!(
+            "simulated with a coefficient of {coefficient}:{}{estimate}",
+            parts.join(",")
+        ),
+        ..expected
+    }
 }
 
 /// Counts of what went wrong, in words, where it did.

@@ -98,7 +98,8 @@ fn peak_at(
     affordable: f64,
     options: &PrepareOptions,
 ) -> Result<Peak, Error> {
-    let mut scene = scene.clone();
+    // The part is what is compared.
+    let mut scene = scene.with_friction(false);
     scene.part.order = Some(order);
     scene.part.interior_order = None;
     scene.accuracy.budget_us = None;

@@ -37,7 +37,8 @@ pub fn force_travel(rows: &[StepRow]) -> String {
 }
 
 /// Header of `curve.csv`; other programs rely on it.
-pub const CURVE_HEADER: &str = "phase,travel_m,force_N,sideways_m,turn_rad,contacts,converged";
+pub const CURVE_HEADER: &str =
+    "phase,travel_m,force_N,sideways_m,turn_rad,contacts,converged,sticking,dissipated_J,stored_J";
 
 /// `curve.csv`: one line per place of the driven body, in the order in which they were gone to.
 ///
@@ -49,7 +50,7 @@ pub fn curve(rows: &[DriveRow]) -> String {
     for row in rows {
         let _ = writeln!(
             text,
-            "{},{},{},{},{},{},{}",
+            "{},{},{},{},{},{},{},{},{},{}",
             row.phase.name(),
             number(row.travel_m),
             number(row.force_n),
@@ -57,6 +58,9 @@ pub fn curve(rows: &[DriveRow]) -> String {
             number(row.turn_rad),
             row.contacts,
             row.is_converged,
+            row.sticking,
+            number(row.dissipated_j),
+            number(row.stored_j),
         );
     }
     text

@@ -7,7 +7,7 @@ mod drive;
 
 use glam::DVec3;
 
-pub use self::drive::{DriveRow, Driven};
+pub use self::drive::{DriveRow, Driven, FrictionFacts};
 use super::origin::Origin;
 use super::strain::StrainFacts;
 use super::summary::Percentiles;
@@ -308,6 +308,8 @@ pub struct ContactForce {
     pub point: DVec3,
     /// Force on the part, N.
     pub force: DVec3,
+    /// Whether it sticks to the tool; false without friction.
+    pub sticks: bool,
 }
 
 /// The handbook's answer for the same part.

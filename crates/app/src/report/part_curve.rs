@@ -28,6 +28,7 @@ use super::plot::short;
 pub use humps::{HUMP_SHARE, Hump};
 pub use limits::{LimitFact, LimitState, Limits, StrainUse};
 pub use verdict::{Doubts, Outcome, Verdict};
+pub use work::Energy;
 
 /// Share of the way since the first touch over which the curve's trend at its end is seen.
 const END_SHARE: f64 = 0.05;
@@ -82,6 +83,15 @@ impl Removal {
     }
 }
 
+/// A way that friction blocks: the force grows to its end, and all that touches sticks there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Locking {
+    /// Whether it is the way out.
+    pub is_out: bool,
+    /// Where the way ends, with the resistance there, positive.
+    pub place: Place,
+}
+
 /// Key numbers of a driven curve. Rows with numbers that are not finite are passed over.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PartCurve {
@@ -111,6 +121,12 @@ pub struct PartCurve {
     pub net_work_j: f64,
     /// How hard it holds on the way out.
     pub removal: Removal,
+    /// Whether friction blocks a way.
+    pub locking: Option<Locking>,
+    /// Where the last contact ends on the way out, m; `None` where there is none, or it does not end.
+    pub separation_m: Option<f64>,
+    /// Where the work goes.
+    pub energy: Energy,
     /// Largest travel across the direction, m.
     pub sideways_m: f64,
     /// Largest turn, rad.
@@ -157,6 +173,9 @@ impl PartCurve {
             insertion_work_j: work::largest(way_in.get(..=up_to).unwrap_or_default()),
             net_work_j: work::whole(&way_in),
             removal: removal(rows, scale),
+            locking: locking(rows),
+            separation_m: separation(rows),
+            energy: Energy::of(rows),
             sideways_m: largest_of(|row| row.sideways_m),
             turn_rad: largest_of(|row| row.turn_rad),
             n_unconverged: rows.iter().filter(|row| !row.is_converged).count(),
@@ -302,4 +321,31 @@ fn removal(rows: &[DriveRow], scale: f64) -> Removal {
             ..last
         }),
     }
+}
+
+/// Of the ways that end where they resist most, the first at whose end all contacts stick.
+fn locking(rows: &[DriveRow]) -> Option<Locking> {
+    let of_way = |phase: Phase| {
+        let is_out = phase == Phase::Retract;
+        let resistance = |row: &DriveRow| if is_out { -row.force_n } else { row.force_n };
+        let way = || rows.iter().filter(|row| row.phase == phase);
+        let last = way().next_back()?;
+        let largest = way().map(resistance).fold(0.0, f64::max);
+        let sticks = last.contacts > 0 && last.sticking == last.contacts;
+        let ends_high = resistance(last) > 0.0 && resistance(last) >= largest;
+        (sticks && ends_high).then(|| Locking {
+            is_out,
+            place: Place {
+                travel_m: last.travel_m,
+                force_n: resistance(last),
+            },
+        })
+    };
+    of_way(Phase::Approach).or_else(|| of_way(Phase::Retract))
+}
+
+fn separation(rows: &[DriveRow]) -> Option<f64> {
+    let way_out: Vec<&DriveRow> = rows.iter().filter(|r| r.phase == Phase::Retract).collect();
+    let last = way_out.iter().rposition(|row| row.contacts > 0)?;
+    way_out.get(last + 1).map(|row| row.travel_m)
 }

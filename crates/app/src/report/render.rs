@@ -239,8 +239,12 @@ impl Scene {
             all if all == drawn => String::new(),
             all => format!(" of {all}"),
         };
+        let sticking = match frame.contacts.iter().filter(|c| c.sticks).count() {
+            0 => String::new(),
+            n => format!(" ({n} sticking, green)"),
+        };
         format!(
-            "{shape}; {drawn}{of_all} forces on the part, largest {} N, resultant {} N",
+            "{shape}; {drawn}{of_all} forces on the part{sticking}, largest {} N, resultant {} N",
             short(finite(lengths).fold(0.0, f64::max)),
             short(resultant.length()),
         )

@@ -76,6 +76,9 @@ pub(super) fn drive_rows() -> Vec<DriveRow> {
         sideways_m: 0.0,
         turn_rad: 0.0,
         contacts: (force_n.abs() / 2.0).ceil() as u32,
+        sticking: 0,
+        dissipated_j: 0.0,
+        stored_j: 0.0,
         is_converged: true,
         certificate: 0.0,
     };
@@ -214,6 +217,7 @@ pub(super) fn frame(part: &PartDrawing, label: &str, open: f64) -> Frame {
                 node,
                 point: at,
                 force,
+                sticks: false,
             });
         }
     }

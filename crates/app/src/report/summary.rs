@@ -10,7 +10,7 @@ use super::strain;
 
 mod driven;
 
-use driven::{CurveSummary, LimitSummary, VerdictSummary};
+use driven::{CurveSummary, LimitSummary, LockingSummary, VerdictSummary};
 
 /// Of the file. 2: verdict, limits and the part's own curve came in; no key of 1 has changed or gone.
 const SCHEMA_VERSION: u32 = 2;
@@ -90,6 +90,10 @@ struct Summary<'a> {
     snap_drop_N: f64,
     snap_travel_m: Option<f64>,
     retention_force_N: Option<f64>,
+    peak_retention_force_N: Option<f64>,
+    travel_at_retention_m: Option<f64>,
+    dissipated_work_J: Option<f64>,
+    locking: Option<LockingSummary>,
     insertion_work_J: f64,
     net_work_J: f64,
     coupling_stiffness_N_per_m: Option<f64>,
@@ -246,6 +250,7 @@ pub fn json(run: &Run, curve: &Curve) -> String {
     let facts = &run.facts;
     let curve = &told(run, curve);
     let driven = run.driven.as_ref();
+    let retention = driven.and_then(|driven| driven.curve.removal.peak());
     let is_felt = !run.rows.is_empty();
     let (certificate, max_contacts) = match driven.filter(|_| !is_felt) {
         Some(driven) => (
@@ -268,6 +273,10 @@ pub fn json(run: &Run, curve: &Curve) -> String {
         snap_drop_N: curve.snap_drop_n,
         snap_travel_m: curve.snap_travel_m,
         retention_force_N: curve.retention_force_n,
+        peak_retention_force_N: retention.map(|place| place.force_n),
+        travel_at_retention_m: retention.map(|place| place.travel_m),
+        dissipated_work_J: driven.map(|driven| driven.curve.energy.dissipated_j),
+        locking: driven.and_then(driven::locking),
         insertion_work_J: curve.insertion_work_j,
         net_work_J: curve.net_work_j,
         coupling_stiffness_N_per_m: facts.coupling_stiffness,

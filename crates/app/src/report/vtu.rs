@@ -121,7 +121,15 @@ mod tests {
         let mut shown = sample::frame(&part, "peak", 1.0);
         let (node, force) = (3, DVec3::new(1.0, 2.0, 3.0));
         let point = part.nodes[3];
-        shown.contacts = vec![super::super::ContactForce { node, point, force }; 2];
+        shown.contacts = vec![
+            super::super::ContactForce {
+                node,
+                point,
+                force,
+                sticks: false
+            };
+            2
+        ];
         let piece = read_back(&frame(&part, &shown).unwrap());
         let nodes = values(&piece.points);
         assert_eq!(nodes.len(), 3 * part.nodes.len());

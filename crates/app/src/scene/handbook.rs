@@ -54,8 +54,10 @@ pub struct Predicted {
 /// What a formula's number is the same as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Measured {
-    /// The largest force that resists the insertion.
+    /// The largest force that resists the insertion, without friction.
     Insertion,
+    /// The same with friction.
+    InsertionWithFriction,
     /// The largest force that resists the removal.
     Removal,
     /// The largest force across the insertion.
@@ -65,10 +67,11 @@ pub enum Measured {
 }
 
 impl Handbook {
-    /// What the formulas say of a part of this material, without friction.
-    pub fn predict(&self, material: &Material) -> Prediction {
+    /// What the formulas say of a part of this material without friction, and of a cantilever with `friction` too, Coulomb's
+    /// coefficient where it is simulated, else 0.
+    pub fn predict(&self, material: &Material, friction: f64) -> Prediction {
         match self {
-            Self::Cantilever(arm) => arm.predict(material.young_modulus),
+            Self::Cantilever(arm) => arm.predict(material.young_modulus, friction),
             Self::Annular(cap) => cap.predict(material.young_modulus, material.poisson_ratio),
             Self::Ring(ring) => ring.predict(material.young_modulus),
         }
@@ -109,8 +112,8 @@ pub(super) struct HandbookKeys {
     /// Cantilever and annular: angle of the lead-in ramp to the direction of insertion, above 0 and below 90.
     #[schemars(extend("x-default" = "by kind"))]
     lead_angle_deg: Option<Angle>,
-    /// Cantilever: Coulomb's coefficient on the ramp, at least 0; 0 compares with this program, which
-    /// simulates none.
+    /// Cantilever: Coulomb's coefficient on the ramp for the formula, at least 0; 0 is that of the scene where friction is
+    /// simulated.
     #[schemars(extend("default" = 0.0))]
     friction: Option<Plain>,
     /// Cantilever: number of equal arms that are bent at once, 1 to 100.

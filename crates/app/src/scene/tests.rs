@@ -221,7 +221,20 @@ fn refusals_name_line_key_and_mend() {
         ),
         (
             adding("[effects]\nfriction = \"on\"\n"),
-            "clip.toml:22: this version does not simulate friction; use \"auto\" to be told its size",
+            "clip.toml:22: friction is \"on\" and has no coefficient; write friction_coefficient in [effects], or name both \
+             materials: part.material.name and tool.material",
+        ),
+        (
+            adding("[effects]\ngravity = \"on\"\n"),
+            "clip.toml:22: this version does not simulate gravity; use \"auto\" to be told its size",
+        ),
+        (
+            adding("[effects]\nfriction = \"on\"\nfriction_coefficient = -0.1\n"),
+            "clip.toml:23: friction_coefficient -0.1 must not be negative; write 0 or more",
+        ),
+        (
+            adding("[effects]\nfriction_coefficient = nan\n"),
+            "clip.toml:22: friction_coefficient is NaN; write a number",
         ),
         (
             adding("[effects]\nfriction = \"onn\"\n"),

@@ -7,10 +7,11 @@ use glamx::DPose3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::SceneError;
 use super::check::Check;
 use super::check::Range::{Any, Positive};
+use super::friction::{self, OfPair};
 use super::keys::{At, Direction, In, Length, Plain, Point, Quaternion, place};
+use super::{Material, SceneError};
 
 /// The rigid tool.
 #[derive(Clone, Debug, PartialEq)]
@@ -139,12 +140,48 @@ pub(super) struct ToolKeys {
     /// The tool's rotation as a quaternion x, y, z, w, instead of `axis`; any length but 0.
     #[schemars(extend("x-default" = "by `axis`"))]
     rotation: Option<Quaternion>,
+    /// What it is made of, for the coefficient of friction with `part.material.name`: steel, PTFE, PE-HD, PP, POM, PA, PBT,
+    /// PS, SAN, PC, PMMA, ABS, PE-LD or PVC.
+    #[schemars(extend("x-default" = "not said"))]
+    material: Option<At<String>>,
     /// How the tool stands to the part before the first step.
     #[serde(default)]
     start: Start,
 }
 
 impl ToolKeys {
+    /// Friction of the tool's material with that of the part; `None` where the tool's is not said.
+    pub(super) fn friction(
+        &self,
+        part: &Material,
+        check: &Check<'_>,
+    ) -> Result<Option<OfPair>, SceneError> {
+        let Some(At { value, offset }) = &self.material else {
+            return Ok(None);
+        };
+        let listed: Vec<&str> = friction::names().collect();
+        let unknown = |whose: &str, name: &str| {
+            let what = format!("{whose} \"{name}\" is in no table of friction");
+            let mend = format!(
+                "{}; or state friction_coefficient in [effects] and leave tool.material out",
+                SceneError::mend_of(name, &listed)
+            );
+            check.error(*offset, what, mend)
+        };
+        let tool = friction::known(value).ok_or_else(|| unknown("tool.material", value))?;
+        let name = part.name.as_deref().ok_or_else(|| {
+            let what =
+                "tool.material asks for the friction of a pair, and part.material has no name";
+            let mend = format!("write part.material.name, one of {}", listed.join(", "));
+            check.error(*offset, what, mend)
+        })?;
+        let part = friction::known(name).ok_or_else(|| unknown("part.material.name", name))?;
+        friction::of_pair(part, tool).map(Some).ok_or_else(|| {
+            let what = format!("the friction of {part} on {tool} is in no table");
+            check.error(*offset, what, "state friction_coefficient in [effects]")
+        })
+    }
+
     /// The radius of a cylinder, for what stands for it elsewhere. One that makes no sense is left
     /// to this section's check.
     pub(super) fn cylinder_radius(&self) -> Option<Length> {

@@ -264,11 +264,12 @@ impl Coulomb {
             let on_part = along[0] * frame[0] + along[1] * frame[1] + along[2] * frame[2];
             self.forces.normal[i] = along[0];
             self.forces.on_part[i] = on_part;
+            let sticks = states.get(row) == Some(&State::Stick);
+            self.forces.sticks[i] = sticks;
             if along[0] > 0.0 {
                 let key = places.list()[contact.place as usize].key;
                 self.kept[key as usize] = on_part;
                 self.carrying.push(key);
-                let sticks = states.get(row) == Some(&State::Stick);
                 report.sticking += u32::from(sticks);
             }
         }

@@ -95,7 +95,9 @@ impl Frictionless {
         if let Some(patches) = rows.share.patches() {
             patches.spread(&mut self.forces.normal);
         }
-        let ByContact { normal, on_part } = &mut self.forces;
+        let ByContact {
+            normal, on_part, ..
+        } = &mut self.forces;
         for ((on_part, contact), z) in on_part.iter_mut().zip(&rows.contacts).zip(normal) {
             *on_part = *z * contact.normal;
         }

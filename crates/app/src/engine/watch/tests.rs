@@ -65,7 +65,7 @@ fn loads_of(active: &[ActiveContact], n_candidates: usize) -> Loads {
     let mut loads = Loads::new(n_candidates);
     for contact in active {
         let place = Place::node(contact.candidate, DVec3::ZERO);
-        loads.add(&place, 1.0, contact.force_on_part);
+        loads.add(&place, 1.0, contact.force_on_part, false);
     }
     loads
 }
@@ -105,6 +105,7 @@ impl Forces {
                 candidate: k as u32,
                 normal_force: force.length(),
                 force_on_part: *force,
+                sticks: false,
             })
             .collect()
     }
@@ -228,6 +229,7 @@ fn after_a_force_that_is_no_number_all_is_looked_at_anew() {
             candidate: 200,
             normal_force: 1.0,
             force_on_part: force,
+            sticks: false,
         }];
         let loads = loads_of(&active, rest.len());
         let pose = DPose3::from_translation(DVec3::new(8e-3 - 2e-4 * f64::from(step), 0.0, 4e-3));

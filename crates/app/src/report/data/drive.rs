@@ -20,10 +20,41 @@ pub struct DriveRow {
     pub turn_rad: f64,
     /// Places that carry force.
     pub contacts: u32,
+    /// Of them, those that stick; 0 without friction.
+    pub sticking: u32,
+    /// What friction took since the place before, J; 0 without friction.
+    pub dissipated_j: f64,
+    /// What the part, and the springs of a guide, hold, J.
+    pub stored_j: f64,
     /// Whether the contact planes stood still and the contact problem was solved to its tolerance.
     pub is_converged: bool,
     /// Largest violation of the contact conditions, scaled; 0 is exact.
     pub certificate: f64,
+}
+
+/// Friction that is in a curve, and the curve without it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrictionFacts {
+    /// Coulomb's.
+    pub coefficient: f64,
+    /// Where it is from, if it was not stated.
+    pub source: Option<String>,
+    /// The same way without friction.
+    pub frictionless_rows: Vec<DriveRow>,
+    /// What those say.
+    pub frictionless: PartCurve,
+}
+
+impl FrictionFacts {
+    /// Of the way without friction.
+    pub fn of(coefficient: f64, source: Option<String>, frictionless_rows: Vec<DriveRow>) -> Self {
+        Self {
+            coefficient,
+            source,
+            frictionless: PartCurve::of(&frictionless_rows),
+            frictionless_rows,
+        }
+    }
 }
 
 /// The driven curve, what is read off it, and what was asked of it.
@@ -37,6 +68,8 @@ pub struct Driven {
     pub verdict: Verdict,
     /// What the scene asks of the part, and whether it is so.
     pub limits: Vec<LimitFact>,
+    /// Where friction is in it.
+    pub friction: Option<FrictionFacts>,
 }
 
 impl Driven {
@@ -52,6 +85,7 @@ impl Driven {
             curve,
             verdict,
             limits,
+            friction: None,
         }
     }
 

@@ -29,6 +29,9 @@ fn row(phase: Phase, travel_mm: f64, force_n: f64) -> DriveRow {
         sideways_m: 0.0,
         turn_rad: 0.0,
         contacts: u32::from(force_n != 0.0),
+        sticking: 0,
+        dissipated_j: 0.0,
+        stored_j: 0.0,
         is_converged: true,
         certificate: 0.0,
     }

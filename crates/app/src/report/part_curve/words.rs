@@ -1,8 +1,10 @@
 //! The driven curve in words: for the terminal, and as the page's headline.
 
-use super::super::data::Driven;
+use std::fmt::Write as _;
+
+use super::super::data::{Driven, FrictionFacts};
 use super::super::plot::short;
-use super::{Hump, LimitState, Outcome, PartCurve, Place, Removal};
+use super::{Hump, LimitState, Locking, Outcome, PartCurve, Place, Removal};
 
 /// Humps beside the main one that are told one by one.
 const MOST_TOLD: usize = 3;
@@ -55,6 +57,9 @@ pub(crate) fn lines(driven: &Driven) -> Vec<(String, String)> {
     if curve.is_touched {
         line("removal", removal(curve.removal));
     }
+    if let Some(friction) = &driven.friction {
+        lines_of_friction(curve, friction, &mut line);
+    }
     if curve.sideways_m > 0.0 {
         line("sideways", format!("{} mm", short(1e3 * curve.sideways_m)));
     }
@@ -66,6 +71,60 @@ pub(crate) fn lines(driven: &Driven) -> Vec<(String, String)> {
         line(&limit.state.name().to_uppercase(), limit.text.clone());
     }
     lines
+}
+
+fn lines_of_friction(
+    curve: &PartCurve,
+    friction: &FrictionFacts,
+    line: &mut impl FnMut(&str, String),
+) {
+    let plain = &friction.frictionless;
+    let of = |place: Option<Place>| place.map_or_else(|| "0".to_owned(), |p| newtons(p.force_n));
+    let mut text = format!(
+        "coefficient {}: in {} N for {} without",
+        short(friction.coefficient),
+        of(curve.insertion()),
+        of(plain.insertion()),
+    );
+    if let (Some(out), Some(plain_out)) = (curve.removal.peak(), plain.removal.peak()) {
+        let _ = write!(
+            text,
+            ", out {} N for {}",
+            newtons(out.force_n),
+            newtons(plain_out.force_n)
+        );
+        if let Some(into) = curve.insertion().filter(|p| p.force_n > 0.0) {
+            let _ = write!(text, "; out / in {}", short(out.force_n / into.force_n));
+        }
+    }
+    line("friction", text);
+    if let Some(source) = &friction.source {
+        line("", source.clone());
+    }
+    let energy = &curve.energy;
+    line(
+        "energy",
+        format!(
+            "{} mJ put in = {} given back + {} by friction + {} stored, {} unaccounted",
+            short(1e3 * energy.put_in_j),
+            short(1e3 * energy.given_back_j),
+            short(1e3 * energy.dissipated_j),
+            short(1e3 * energy.stored_j),
+            short(1e3 * energy.unaccounted_j()),
+        ),
+    );
+    if let Some(locking) = curve.locking {
+        line("locks", locks(locking));
+    }
+}
+
+/// A way that friction blocks.
+fn locks(locking: Locking) -> String {
+    let way = if locking.is_out { "out" } else { "in" };
+    format!(
+        "self-locking on the way {way}: all contacts stick, and the force grows to {}, where the way ends",
+        at(locking.place)
+    )
 }
 
 /// The outcome, and why it does not snap; what keeps it from being known, and the snap's numbers, have lines of their own.
@@ -161,7 +220,7 @@ pub(crate) fn headline(driven: &Driven) -> String {
         ),
         _ => capitalised(&numbers),
     };
-    result + &beside_the_snap(curve) + &limits(driven)
+    result + &beside_the_snap(curve) + &friction(driven) + &limits(driven)
 }
 
 /// The first of many, which are told in full further down.
@@ -210,6 +269,26 @@ fn beside_the_snap(curve: &PartCurve) -> String {
         Removal::Out(_) | Removal::NotPulled => String::new(),
     };
     further + &seat + &work + &removal
+}
+
+/// What friction adds to pushing in and pulling out, and whether it blocks a way.
+fn friction(driven: &Driven) -> String {
+    let Some(friction) = &driven.friction else {
+        return String::new();
+    };
+    let (curve, plain) = (&driven.curve, &friction.frictionless);
+    let of = |place: Option<Place>| place.map_or_else(|| "0".to_owned(), |p| short(p.force_n));
+    let out = plain.removal.peak();
+    let out = out.map_or_else(String::new, |p| format!(" and out {} N", short(p.force_n)));
+    let locks = curve.locking.map_or_else(String::new, |locking| {
+        let way = if locking.is_out { "out" } else { "in" };
+        format!(" It locks on the way {way}: all contacts stick where the way ends.")
+    });
+    format!(
+        " Friction with a coefficient of {} is in these numbers; without it pushing in takes {} N{out}.{locks}",
+        short(friction.coefficient),
+        of(plain.insertion()),
+    )
 }
 
 /// How many limits are kept, and how many cannot be told.

@@ -1,6 +1,48 @@
 //! Integrals of force over travel, by the trapezoid rule.
 
+use super::super::data::DriveRow;
 use super::Point;
+
+/// Where the work goes that the held body does, in and out, J.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Energy {
+    /// Work against the part.
+    pub put_in_j: f64,
+    /// Work that the part gave back.
+    pub given_back_j: f64,
+    /// What friction took.
+    pub dissipated_j: f64,
+    /// What part and springs hold at the end.
+    pub stored_j: f64,
+}
+
+impl Energy {
+    /// Of driven rows, by the trapezoid rule. Rows with numbers that are not finite are passed over.
+    pub(super) fn of(rows: &[DriveRow]) -> Self {
+        let mut energy = Self::default();
+        let is_finite = |row: &&DriveRow| row.travel_m.is_finite() && row.force_n.is_finite();
+        let mut before: Option<&DriveRow> = None;
+        for row in rows.iter().filter(is_finite) {
+            if let Some(before) = before {
+                let work = 0.5 * (before.force_n + row.force_n) * (row.travel_m - before.travel_m);
+                if work > 0.0 {
+                    energy.put_in_j += work;
+                } else {
+                    energy.given_back_j -= work;
+                }
+            }
+            energy.dissipated_j += row.dissipated_j;
+            energy.stored_j = row.stored_j;
+            before = Some(row);
+        }
+        energy
+    }
+
+    /// What the balance lacks, J: the rule's error, and what is lost where the part itself springs.
+    pub fn unaccounted_j(&self) -> f64 {
+        self.put_in_j - self.given_back_j - self.dissipated_j - self.stored_j
+    }
+}
 
 /// The whole integral, J.
 pub(super) fn whole(points: &[Point]) -> f64 {

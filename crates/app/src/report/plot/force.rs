@@ -37,6 +37,8 @@ pub enum Look {
     OtherIn,
     /// Another curve on the way out.
     OtherOut,
+    /// The main curve without friction, in and out: thin, behind.
+    Frictionless,
     /// From a formula or a file: dashed.
     Reference,
 }
@@ -48,6 +50,7 @@ impl Look {
             Self::Out => VERMILLION,
             Self::OtherIn => GREEN,
             Self::OtherOut => ORANGE,
+            Self::Frictionless => GREY,
             Self::Reference => INK,
         }
     }
@@ -55,6 +58,7 @@ impl Look {
     fn width(self) -> i32 {
         match self {
             Self::In => 3,
+            Self::Frictionless => 1,
             _ => 2,
         }
     }
@@ -117,6 +121,10 @@ pub fn curves(run: &Run) -> Vec<Series> {
     };
     add(into, driven(false), Look::In);
     add(out, driven(true), Look::Out);
+    let friction = run.driven.as_ref().and_then(|d| d.friction.as_ref());
+    let plain = friction.map_or(&[][..], |f| &f.frictionless_rows);
+    let plain = plain.iter().map(|row| (row.travel_m, row.force_n));
+    add("without friction", plain.collect(), Look::Frictionless);
     add("felt by the hand", felt(false), felt_in);
     add("felt, pulling out", felt(true), felt_out);
     all.extend(run.handbook.as_ref().and_then(of_handbook));
@@ -204,11 +212,12 @@ pub fn force_travel(
         chart.draw_series(LineSeries::new([(x0, 0.0), (x1, 0.0)], stroke(GREY, 1)))?;
         // The main curve lies over the others, and what it is compared with over it in dashes.
         let rank = |look: Look| match look {
-            Look::OtherOut => 0,
-            Look::OtherIn => 1,
-            Look::Out => 2,
-            Look::In => 3,
-            Look::Reference => 4,
+            Look::Frictionless => 0,
+            Look::OtherOut => 1,
+            Look::OtherIn => 2,
+            Look::Out => 3,
+            Look::In => 4,
+            Look::Reference => 5,
         };
         let mut order: Vec<_> = lines.iter().collect();
         order.sort_by_key(|line| rank(line.look));

@@ -12,6 +12,9 @@ use super::surface::Surface;
 /// Colour of a force.
 const FORCE: [f32; 3] = [0.80, 0.10, 0.32];
 
+/// Of one at a contact that sticks to the tool.
+const STICKING: [f32; 3] = [0.0, 0.45, 0.30];
+
 /// Cut faces of the tool: their ground, and the lines of the hatching.
 const TOOL_CUT: [[f32; 3]; 2] = [[0.86, 0.88, 0.91], [0.45, 0.48, 0.53]];
 
@@ -174,18 +177,20 @@ impl Painter<'_> {
         contacts: &[ContactForce],
         metres_per_newton: f64,
     ) {
-        let mut arrows: Vec<[[f64; 3]; 2]> = contacts
+        let mut arrows: Vec<([[f64; 3]; 2], _)> = contacts
             .iter()
             .filter(|c| self.has(c))
             .map(|c| {
                 let tail = c.point - c.force * metres_per_newton;
-                [self.camera.project(tail), self.camera.project(c.point)]
+                let colour = if c.sticks { STICKING } else { FORCE };
+                let ends = [self.camera.project(tail), self.camera.project(c.point)];
+                (ends, colour)
             })
-            .filter(|ends| ends.iter().flatten().all(|v| v.is_finite()))
+            .filter(|(ends, _)| ends.iter().flatten().all(|v| v.is_finite()))
             .collect();
-        arrows.sort_by(|a, b| b[1][2].total_cmp(&a[1][2]));
-        for ends in arrows {
-            layer.arrow(ends, FORCE);
+        arrows.sort_by(|(a, _), (b, _)| b[1][2].total_cmp(&a[1][2]));
+        for (ends, colour) in arrows {
+            layer.arrow(ends, colour);
         }
     }
 

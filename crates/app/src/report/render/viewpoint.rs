@@ -284,6 +284,7 @@ mod tests {
                 node: 0,
                 point: place,
                 force: DVec3::NEG_Y,
+                sticks: false,
             }],
             ..Frame::default()
         }];
@@ -352,6 +353,7 @@ mod tests {
             node: 0,
             point: DVec3::NAN,
             force: DVec3::NAN,
+            sticks: false,
         }];
         assert!(chosen(&run).0.view == own);
     }

@@ -66,6 +66,65 @@ impl From<Place> for PlaceSummary {
     non_snake_case,
     reason = "keys of the file carry their unit in its own letters"
 )]
+pub(super) struct LockingSummary {
+    way: &'static str,
+    force_N: f64,
+    travel_m: f64,
+}
+
+pub(super) fn locking(driven: &Driven) -> Option<LockingSummary> {
+    let locking = driven.curve.locking?;
+    Some(LockingSummary {
+        way: if locking.is_out { "out" } else { "in" },
+        force_N: locking.place.force_n,
+        travel_m: locking.place.travel_m,
+    })
+}
+
+#[derive(Serialize)]
+#[expect(
+    non_snake_case,
+    reason = "keys of the file carry their unit in its own letters"
+)]
+struct FrictionSummary {
+    coefficient: f64,
+    source: Option<String>,
+    frictionless_peak_insertion_force_N: Option<f64>,
+    frictionless_peak_removal_force_N: Option<f64>,
+    removal_over_insertion: Option<f64>,
+    separation_travel_m: Option<f64>,
+    put_in_J: f64,
+    given_back_J: f64,
+    dissipated_J: f64,
+    stored_J: f64,
+    unaccounted_J: f64,
+}
+
+fn friction(driven: &Driven) -> Option<FrictionSummary> {
+    let facts = driven.friction.as_ref()?;
+    let (curve, plain) = (&driven.curve, &facts.frictionless);
+    let force = |place: Option<Place>| place.map(|place| place.force_n);
+    let (into, out) = (force(curve.insertion()), force(curve.removal.peak()));
+    Some(FrictionSummary {
+        coefficient: facts.coefficient,
+        source: facts.source.clone(),
+        frictionless_peak_insertion_force_N: force(plain.insertion()),
+        frictionless_peak_removal_force_N: force(plain.removal.peak()),
+        removal_over_insertion: into.zip(out).map(|(into, out)| out / into),
+        separation_travel_m: curve.separation_m,
+        put_in_J: curve.energy.put_in_j,
+        given_back_J: curve.energy.given_back_j,
+        dissipated_J: curve.energy.dissipated_j,
+        stored_J: curve.energy.stored_j,
+        unaccounted_J: curve.energy.unaccounted_j(),
+    })
+}
+
+#[derive(Serialize)]
+#[expect(
+    non_snake_case,
+    reason = "keys of the file carry their unit in its own letters"
+)]
 struct HumpSummary {
     peak_force_N: f64,
     travel_at_peak_m: f64,
@@ -112,6 +171,7 @@ pub(super) struct CurveSummary {
     sideways_m: f64,
     turn_deg: f64,
     not_converged: usize,
+    friction: Option<FrictionSummary>,
 }
 
 pub(super) fn curve(driven: &Driven) -> CurveSummary {
@@ -138,5 +198,6 @@ pub(super) fn curve(driven: &Driven) -> CurveSummary {
         sideways_m: curve.sideways_m,
         turn_deg: curve.turn_rad.to_degrees(),
         not_converged: curve.n_unconverged,
+        friction: friction(driven),
     }
 }

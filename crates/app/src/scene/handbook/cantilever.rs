@@ -135,8 +135,8 @@ impl Cantilever {
         self.friction * self.lead_angle_deg.to_radians().tan() >= 1.0
     }
 
-    /// What the formulas say without friction, as simulated. `young_modulus` in Pa.
-    pub(super) fn predict(&self, young_modulus: f64) -> Prediction {
+    /// What the formulas say without friction, and with that which is simulated. `young_modulus` in Pa.
+    pub(super) fn predict(&self, young_modulus: f64, friction: f64) -> Prediction {
         let frictionless = Self {
             friction: 0.0,
             ..*self
@@ -167,6 +167,29 @@ impl Cantilever {
                 }),
             );
         }
+        let own = if self.friction > 0.0 {
+            self.friction
+        } else {
+            friction
+        };
+        let rubbing = Self {
+            friction: own,
+            ..*self
+        };
+        if friction > 0.0 && !rubbing.is_locked() {
+            let mating = rubbing.mating_force(young_modulus);
+            rows.push(force(
+                "mating force with friction",
+                Measured::InsertionWithFriction,
+                mating,
+            ));
+            if self.edge_radius > 0.0 {
+                rows.extend(rubbing.rounded(young_modulus).map(|value| {
+                    let label = "with friction, of a rounded edge";
+                    force(label, Measured::InsertionWithFriction, value)
+                }));
+            }
+        }
         rows.push(Predicted {
             label: "largest strain",
             what: Measured::Strain,
@@ -194,7 +217,7 @@ impl Cantilever {
             Ramp::Tool => angle,
         };
         let across = self.deflection_force(young_modulus) * bent / self.undercut;
-        Some(across * turned.tan())
+        Some(on_ramp(across, turned.to_degrees(), self.friction))
     }
 
     fn name(&self) -> String {

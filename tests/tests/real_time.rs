@@ -52,12 +52,15 @@ fn nothing_in_the_haptic_loop_allocates() {
 }
 
 /// All scenes, pushed in and pulled out again, a jump of the handle and a pose that is refused; the
-/// clip also with 32-bit numbers, with most of its columns missing, and with its shape drawn from free nodes; and with fewer rows than contacts come near, of nodes and of the tool's edges.
+/// clip also with friction, with 32-bit numbers, with most of its columns missing, and with its shape drawn from free nodes; and with fewer rows than contacts come near, of nodes and of the tool's edges.
 fn no_step_of_an_insertion_allocates() {
     let all = (Columns::All, Scalar::F64);
     let bent = Adaptive::On(FreeNodes::Indicator(1e-3));
     for (name, adaptive, (columns, contact_scalar), rows) in [
         ("clip.toml", Adaptive::Off, all, None),
+        ("clip.toml with friction", Adaptive::Off, all, None),
+        ("edge.toml with friction", Adaptive::Off, all, None),
+        ("clip.toml with friction", Adaptive::Off, all, Some(3)),
         (
             "clip.toml",
             Adaptive::Off,
@@ -76,7 +79,10 @@ fn no_step_of_an_insertion_allocates() {
         ("clip.toml", Adaptive::Off, all, Some(3)),
         ("edge.toml", Adaptive::Off, all, Some(1)),
     ] {
-        let mut scene = Scene::load(&root().join("scenes").join(name)).unwrap();
+        let file = name.trim_end_matches(" with friction");
+        let scene = Scene::load(&root().join("scenes").join(file)).unwrap();
+        let mut scene = scene.with_friction(file != name);
+        scene.effects.friction_coefficient = Some(0.2);
         scene.accuracy.adaptive = adaptive;
         scene.accuracy.columns = columns;
         scene.accuracy.contact_scalar = contact_scalar;

@@ -11,6 +11,7 @@ mod contact_cases;
 mod docs;
 mod drive;
 mod fast_path;
+mod friction;
 mod interior;
 mod multiply;
 mod p_method;

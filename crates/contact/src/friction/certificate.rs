@@ -50,6 +50,58 @@ pub(super) fn of(problem: &Problem, forces: &[f64], u: &[f64]) -> Certificate {
     judge.certificate
 }
 
+/// The natural residual alone, where u = q + W λ is already there.
+pub(super) fn natural_residual(problem: &Problem, per_q: f64, forces: &[f64], u: &[f64]) -> f64 {
+    let per = [per_size(forces), per_q];
+    let triples = forces.as_chunks::<3>().0.iter().zip(u.as_chunks::<3>().0);
+    let each = triples
+        .zip(problem.friction_coefficients())
+        .map(|((force, u), mu)| residual_of(per, *mu, force, u));
+    each.fold(0.0, f64::max)
+}
+
+/// 1 / the largest size, 1 if all are 0.
+pub(super) fn per_size(values: &[f64]) -> f64 {
+    let max = max_abs(values);
+    if max > 0.0 {
+        1.0 / max.max(f64::MIN_POSITIVE)
+    } else {
+        1.0
+    }
+}
+
+/// In lanes, so that it is vectorised.
+pub(super) fn max_abs(values: &[f64]) -> f64 {
+    let larger = |max: f64, x: f64| {
+        let x = x.abs();
+        if x > max { x } else { max }
+    };
+    let mut lanes = [0.0; 4];
+    let (chunks, rest) = values.as_chunks::<4>();
+    for chunk in chunks {
+        for (lane, &x) in lanes.iter_mut().zip(chunk) {
+            *lane = larger(*lane, x);
+        }
+    }
+    lanes.iter().chain(rest).fold(0.0, |max, &x| larger(max, x))
+}
+
+/// |λ - P(λ - ũ)| of one contact; `per`: what forces and gaps are multiplied by first.
+fn residual_of(per: [f64; 2], mu: f64, force: &[f64; 3], u: &[f64; 3]) -> f64 {
+    let scaled = force.map(|f| f * per[0]);
+    let mut raised = u.map(|u| u * per[1]);
+    raised[0] += mu * cone::tangential(&raised);
+    let trial = [0, 1, 2].map(|k| scaled[k] - raised[k]);
+    let nearest = cone::project(&trial, mu);
+    let distances = [0, 1, 2].map(|k| (scaled[k] - nearest[k]).abs());
+    // A NaN must not look like a solution.
+    if distances.iter().any(|d| d.is_nan()) {
+        f64::INFINITY
+    } else {
+        distances.iter().fold(0.0, |max: f64, d| max.max(*d))
+    }
+}
+
 struct Judge {
     per_force: f64,
     per_q: f64,
@@ -58,14 +110,6 @@ struct Judge {
 
 impl Judge {
     fn new(problem: &Problem, forces: &[f64]) -> Self {
-        let per_size = |values: &[f64]| {
-            let max = values.iter().fold(0.0, |max: f64, x| max.max(x.abs()));
-            if max > 0.0 {
-                1.0 / max.max(f64::MIN_POSITIVE)
-            } else {
-                1.0
-            }
-        };
         let start = if problem.n_contacts() == 0 {
             0.0
         } else {
@@ -85,18 +129,8 @@ impl Judge {
     }
 
     fn contact(&mut self, mu: f64, force: [f64; 3], u: [f64; 3]) {
+        let residual = residual_of([self.per_force, self.per_q], mu, &force, &u);
         let c = &mut self.certificate;
-        let scaled = force.map(|f| f * self.per_force);
-        let raised = [u[0] + mu * u[1].hypot(u[2]), u[1], u[2]].map(|u| u * self.per_q);
-        let trial = [0, 1, 2].map(|k| scaled[k] - raised[k]);
-        let nearest = cone::project(&trial, mu);
-        let distances = [0, 1, 2].map(|k| (scaled[k] - nearest[k]).abs());
-        // A NaN must not look like a solution.
-        let residual = if distances.iter().any(|d| d.is_nan()) {
-            f64::INFINITY
-        } else {
-            distances.iter().fold(0.0, |max: f64, d| max.max(*d))
-        };
         c.natural_residual = c.natural_residual.max(residual);
         c.min_normal_force = c.min_normal_force.min(force[0]);
         c.min_gap = c.min_gap.min(u[0]);

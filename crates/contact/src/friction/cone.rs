@@ -1,8 +1,8 @@
 //! The friction cone K = { λ : |λ_t| ≤ μ λ_n } and the nearest point of it.
 
-/// Length of the tangential part.
+/// Length of the tangential part. Exact to round-off between 1e-150 and 1e150, much faster than `hypot`.
 pub(super) fn tangential(v: &[f64; 3]) -> f64 {
-    v[1].hypot(v[2])
+    (v[1] * v[1] + v[2] * v[2]).sqrt()
 }
 
 /// The point of the cone nearest to `v`.

@@ -3,12 +3,22 @@
 use std::time::Instant;
 
 use super::local::Local;
-use super::{Certificate, Problem, Scratch, Settings, Solution, State, Status, certificate, cone};
+use super::{Problem, Scratch, Settings, Solution, Status, certificate, cone};
 use crate::error::Error;
 use crate::lcp;
 
 /// Sweeps between two tries of Newton's method. The first few find out who sticks.
 const SWEEPS_PER_TRY: usize = 5;
+
+/// Natural residual at which no step more is taken, no unit: 1e-12 is promised, and the next step would cost more than it
+/// gives. Newton's last step usually ends far below.
+const GOAL: f64 = 10.0 * lcp::GOAL;
+
+/// Newton steps in a row that may lose: the states change under them.
+const MAX_LOSSES: usize = 4;
+
+/// Steps with the factor of an earlier step, which cost a third, if so few reach the goal.
+const MAX_KEPT: i32 = 3;
 
 pub(super) fn run(
     problem: &Problem,
@@ -33,15 +43,15 @@ pub(super) fn run(
             index,
         });
     }
-    scratch.states.clear();
-    scratch.states.resize(n, State::Open);
-    scratch.directions.clear();
-    scratch.directions.resize(n, [0.0; 2]);
+    let per_q = certificate::per_size(problem.q());
+    scratch.contacts.reset(problem, 1.0 / per_q);
+    scratch.newton.is_regularised = false;
     let mut run = Run {
         problem,
         settings,
         forces,
         u: slip,
+        per_q,
         sweeps: 0,
         newton_steps: 0,
     };
@@ -49,23 +59,15 @@ pub(super) fn run(
     if !is_warm || !has_friction {
         run.start_without_friction(scratch)?;
     } else {
-        for (force, mu) in run
-            .forces
-            .as_chunks_mut::<3>()
-            .0
-            .iter_mut()
-            .zip(problem.friction_coefficients())
-        {
-            *force = cone::project(force, *mu);
-        }
+        run.start_warm(scratch);
     }
     run.update_gaps();
-    let certificate = if has_friction {
-        run.solve(scratch)
+    if has_friction {
+        run.solve(scratch, is_warm)?;
     } else {
-        run.find_states(scratch);
-        certificate::of(problem, run.forces, run.u)
-    };
+        scratch.contacts.find(problem, run.u, run.forces);
+    }
+    let certificate = certificate::of(problem, run.forces, run.u);
     let status = if certificate.natural_residual <= settings.tolerance {
         Status::Solved
     } else {
@@ -85,25 +87,57 @@ struct Run<'a> {
     forces: &'a mut [f64],
     /// q + W λ.
     u: &'a mut [f64],
+    /// 1 / the largest |q|.
+    per_q: f64,
     sweeps: usize,
     newton_steps: usize,
 }
 
 impl Run<'_> {
+    /// The given forces, inside their cones, and the states they tell.
+    fn start_warm(&mut self, scratch: &mut Scratch) {
+        let problem = self.problem;
+        let triples = self.forces.as_chunks_mut::<3>().0;
+        for (contact, (force, mu)) in triples
+            .iter_mut()
+            .zip(problem.friction_coefficients())
+            .enumerate()
+        {
+            *force = if scratch.contacts.can_close(contact) {
+                cone::project(force, *mu)
+            } else {
+                [0.0; 3]
+            };
+        }
+        scratch.contacts.read(problem, self.forces);
+    }
+
     /// Normal forces from the complementarity problem of the normal rows, no tangential ones.
     fn start_without_friction(&mut self, scratch: &mut Scratch) -> Result<(), Error> {
+        self.forces.fill(0.0);
+        self.u.copy_from_slice(self.problem.q());
+        self.find_normal_forces(scratch)
+    }
+
+    /// The normal forces that close the gaps while the tangential ones stay, from `u` as it is; leaves `u` behind.
+    /// Tangential forces that would be outside their cone then are cut down to it.
+    fn find_normal_forces(&mut self, scratch: &mut Scratch) -> Result<(), Error> {
         let problem = self.problem;
         let n = problem.n_contacts();
         let matrix = &mut scratch.normal_matrix[..n * n];
+        let q = &mut scratch.normal_q[..n];
+        for (target, source) in q.iter_mut().zip(self.u.iter().step_by(3)) {
+            *target = *source;
+        }
         for (j, target) in matrix.chunks_exact_mut(n.max(1)).enumerate() {
             let column = problem.column(3 * j);
-            for (target, source) in target.iter_mut().zip(column.iter().step_by(3)) {
+            let force = self.forces[3 * j];
+            for ((target, source), q) in
+                target.iter_mut().zip(column.iter().step_by(3)).zip(&mut *q)
+            {
                 *target = *source;
+                *q -= force * source;
             }
-        }
-        let q = &mut scratch.normal_q[..n];
-        for (target, source) in q.iter_mut().zip(problem.q().iter().step_by(3)) {
-            *target = *source;
         }
         let z = &mut scratch.normal_force[..n];
         lcp::solve(
@@ -117,49 +151,61 @@ impl Run<'_> {
             z,
             &mut scratch.normal_gap[..n],
         )?;
-        self.forces.fill(0.0);
-        for (force, z) in self.forces.iter_mut().step_by(3).zip(z) {
-            *force = *z;
+        let triples = self.forces.as_chunks_mut::<3>().0.iter_mut();
+        for ((force, z), mu) in triples.zip(z).zip(problem.friction_coefficients()) {
+            force[0] = *z;
+            let (drag, most) = (cone::tangential(force), mu * *z);
+            if drag > most {
+                *force = [*z, force[1] * most / drag, force[2] * most / drag];
+            }
         }
         Ok(())
     }
 
-    fn solve(&mut self, scratch: &mut Scratch) -> Certificate {
-        let mut best = certificate::of(self.problem, self.forces, self.u);
+    /// Newton's method first; where it does not end, sweeps and Newton's method in turns. Leaves the best forces.
+    fn solve(&mut self, scratch: &mut Scratch, is_warm: bool) -> Result<(), Error> {
         let n_rows = self.forces.len();
-        scratch.best[..n_rows].copy_from_slice(self.forces);
-        while self.sweeps < self.settings.max_sweeps
-            && best.natural_residual > lcp::GOAL
-            && !self.is_over()
-        {
+        let mut best = Best {
+            residual: f64::INFINITY,
+            is_current: false,
+        };
+        best.see(self, &mut scratch.best);
+        scratch.start[..n_rows].copy_from_slice(self.forces);
+        self.newton(scratch, &mut best);
+        if is_warm && best.residual > GOAL && !self.is_over() {
+            // Too far from the forces given: as if there were none.
+            self.start_without_friction(scratch)?;
+            self.update_gaps();
+            scratch.start[..n_rows].copy_from_slice(self.forces);
+            self.newton(scratch, &mut best);
+        }
+        while self.sweeps < self.settings.max_sweeps && best.residual > GOAL && !self.is_over() {
+            self.forces.copy_from_slice(&scratch.start[..n_rows]);
+            self.update_gaps();
             for _ in 0..SWEEPS_PER_TRY.min(self.settings.max_sweeps - self.sweeps) {
                 self.sweep(scratch);
             }
             // From scratch: the updates of the sweeps gather round-off.
             self.update_gaps();
-            let swept = certificate::of(self.problem, self.forces, self.u);
-            if swept.natural_residual < best.natural_residual {
-                best = swept;
-                scratch.best[..n_rows].copy_from_slice(self.forces);
-            }
-            scratch.swept[..n_rows].copy_from_slice(self.forces);
-            let refined = self.newton(scratch, swept);
-            if refined.natural_residual < best.natural_residual {
-                best = refined;
-                scratch.best[..n_rows].copy_from_slice(self.forces);
-            } else if best.natural_residual <= self.settings.tolerance {
+            let before = best.residual;
+            best.see(self, &mut scratch.best);
+            scratch.start[..n_rows].copy_from_slice(self.forces);
+            if self.newton_steps < self.settings.max_newton_steps {
+                // Sweeps are slow to tell who is open where the part is slender.
+                self.find_normal_forces(scratch)?;
+                self.update_gaps();
+                self.newton(scratch, &mut best);
+            } else if best.residual >= before && best.residual <= self.settings.tolerance {
                 // Good enough, and nothing makes it better.
                 break;
             }
-            if refined.natural_residual >= swept.natural_residual {
-                self.forces.copy_from_slice(&scratch.swept[..n_rows]);
-                self.update_gaps();
-            }
         }
-        self.forces.copy_from_slice(&scratch.best[..n_rows]);
-        self.update_gaps();
-        self.find_states(scratch);
-        best
+        if !best.is_current {
+            self.forces.copy_from_slice(&scratch.best[..n_rows]);
+            self.update_gaps();
+            scratch.contacts.find(self.problem, self.u, self.forces);
+        }
+        Ok(())
     }
 
     /// Every contact once, the others standing still.
@@ -173,7 +219,7 @@ impl Run<'_> {
             let b = [0, 1, 2].map(|row: usize| {
                 self.u[first + row] - w[row][0] * old[0] - w[row][1] * old[1] - w[row][2] * old[2]
             });
-            if w[0][0] <= 0.0 {
+            if !scratch.contacts.can_close(contact) {
                 // A point that no force moves never carries any.
                 continue;
             }
@@ -182,81 +228,76 @@ impl Run<'_> {
                 b,
                 friction_coefficient: problem.friction_coefficients()[contact],
             };
-            let answer = local.solve(scratch.directions[contact]);
-            scratch.states[contact] = answer.state;
-            scratch.directions[contact] = answer.direction;
-            for axis in 0..3 {
-                let change = answer.force[axis] - old[axis];
-                if change != 0.0 {
-                    self.forces[first + axis] = answer.force[axis];
-                    for (u, &w) in self.u.iter_mut().zip(columns[axis]) {
-                        *u += change * w;
-                    }
-                }
-            }
+            let answer = local.solve(scratch.contacts.directions[contact]);
+            scratch.contacts.states[contact] = answer.state;
+            scratch.contacts.directions[contact] = answer.direction;
+            self.forces[first..first + 3].copy_from_slice(&answer.force);
+            self.add_columns(
+                contact,
+                [0, 1, 2].map(|axis| answer.force[axis] - old[axis]),
+            );
         }
         self.sweeps += 1;
     }
 
-    /// Newton steps from the forces as they are, whose certificate is `start`, while they gain. Leaves the last forces.
-    fn newton(&mut self, scratch: &mut Scratch, start: Certificate) -> Certificate {
-        /// A step may lose before it gains: the states change under it.
-        const MAX_LOSSES: usize = 2;
-        let mut last = start;
+    /// Newton steps from the forces as they are, while they gain.
+    fn newton(&mut self, scratch: &mut Scratch, best: &mut Best) {
+        self.settle(scratch);
+        let mut last = best.see(self, &mut scratch.best);
         let mut losses = 0;
-        while self.newton_steps < self.settings.max_newton_steps
-            && last.natural_residual > lcp::GOAL
-            && losses <= MAX_LOSSES
-            && !self.is_over()
-        {
-            self.newton_steps += 1;
-            for (contact, state) in scratch.states.iter().enumerate() {
-                if *state == State::Open {
-                    self.forces[3 * contact..3 * contact + 3].fill(0.0);
+        let mut is_kept = false;
+        while last > GOAL && losses <= MAX_LOSSES && !self.is_over() {
+            if !is_kept {
+                if self.newton_steps >= self.settings.max_newton_steps {
+                    return;
+                }
+                self.newton_steps += 1;
+                let contacts = &scratch.contacts;
+                let newton = &mut scratch.newton;
+                if !newton.factorise(self.problem, contacts, self.u, self.forces) {
+                    return;
                 }
             }
-            self.update_gaps();
-            if !scratch
-                .newton
-                .step(self.problem, &scratch.states, self.u, self.forces)
-            {
-                break;
+            if !scratch.newton.solve(&scratch.contacts, self.u) {
+                return;
             }
+            scratch.newton.add_to(self.forces);
             self.update_gaps();
-            let next = certificate::of(self.problem, self.forces, self.u);
-            if next.natural_residual >= last.natural_residual {
-                losses += 1;
-            }
+            let is_new = self.settle(scratch);
+            let lowest = best.residual;
+            let next = best.see(self, &mut scratch.best);
+            losses = if next < lowest { 0 } else { losses + 1 };
+            // A step that squares the error by a factor r leaves a factor that gains about as much again.
+            let gain = next / last;
+            let expected = if is_kept { gain } else { 2.0 * gain };
+            is_kept = !is_new && expected < 1.0 && next * expected.powi(MAX_KEPT) <= GOAL;
             last = next;
-            self.find_states(scratch);
         }
-        last
     }
 
-    /// What each contact does, from the projection of its forces.
-    fn find_states(&self, scratch: &mut Scratch) {
-        let problem = self.problem;
-        for (contact, state) in scratch.states.iter_mut().enumerate() {
-            let first = 3 * contact;
-            let mu = problem.friction_coefficients()[contact];
-            let diagonal = |axis: usize| problem.column(first + axis)[first + axis];
-            let per = |compliance: f64| {
-                if compliance > 0.0 {
-                    1.0 / compliance
-                } else {
-                    0.0
-                }
-            };
-            let along = per(0.5 * (diagonal(1) + diagonal(2)));
-            let rho = [per(diagonal(0)), along, along];
-            let trial = [0, 1, 2].map(|k| self.forces[first + k] - rho[k] * self.u[first + k]);
-            *state = if trial[0] <= 0.0 {
-                State::Open
-            } else if cone::tangential(&trial) <= mu * trial[0] {
-                State::Stick
-            } else {
-                State::Slip
-            };
+    /// States from the forces, forces as the states want them. True if a state changed.
+    fn settle(&mut self, scratch: &mut Scratch) -> bool {
+        let contacts = &mut scratch.contacts;
+        let is_new = contacts.settle(self.problem, self.u, self.forces);
+        if 2 * contacts.moved().len() > contacts.states.len() {
+            self.update_gaps();
+        } else {
+            for &(contact, change) in contacts.moved() {
+                self.add_columns(contact as usize, change);
+            }
+        }
+        is_new
+    }
+
+    /// u += W times a change of one contact's force.
+    fn add_columns(&mut self, contact: usize, change: [f64; 3]) {
+        if change == [0.0; 3] {
+            return;
+        }
+        let columns = [0, 1, 2].map(|axis| self.problem.column(3 * contact + axis));
+        let lines = columns[0].iter().zip(columns[1]).zip(columns[2]);
+        for (u, ((x, y), z)) in self.u.iter_mut().zip(lines) {
+            *u += change[0] * x + (change[1] * y + change[2] * z);
         }
     }
 
@@ -267,5 +308,25 @@ impl Run<'_> {
     fn is_over(&self) -> bool {
         let deadline = self.settings.deadline;
         deadline.is_some_and(|deadline| Instant::now() >= deadline)
+    }
+}
+
+/// The lowest natural residual seen; its forces are kept.
+struct Best {
+    residual: f64,
+    /// Whether the forces at hand are the best.
+    is_current: bool,
+}
+
+impl Best {
+    /// Natural residual of the forces at hand.
+    fn see(&mut self, run: &Run, kept: &mut [f64]) -> f64 {
+        let residual = certificate::natural_residual(run.problem, run.per_q, run.forces, run.u);
+        self.is_current = residual < self.residual || self.residual.is_infinite();
+        if self.is_current {
+            self.residual = residual;
+            kept[..run.forces.len()].copy_from_slice(run.forces);
+        }
+        residual
     }
 }

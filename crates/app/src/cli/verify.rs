@@ -86,7 +86,11 @@ fn table(result: &CaseResult) -> String {
     for q in &result.quantities {
         text += &format!(
             "  {} {:<28} {:>22} {:>22}  error {:.1e}  tolerance {}\n",
-            if q.is_within() { "ok  " } else { "FAIL" },
+            match (q.is_within(), q.is_informative()) {
+                (true, true) => "told",
+                (true, false) => "ok  ",
+                (false, _) => "FAIL",
+            },
             q.name,
             brief(&q.computed),
             brief(&q.expected),
@@ -114,15 +118,12 @@ fn brief(value: &serde_json::Value) -> String {
         serde_json::Value::String(s) => s.clone(),
         serde_json::Value::Bool(b) => if *b { "yes" } else { "no" }.to_owned(),
         serde_json::Value::Object(o) => match o.get("force_on_tool_N").and_then(|f| f.as_array()) {
-            Some(f) => {
-                let size: f64 = f
-                    .iter()
-                    .filter_map(serde_json::Value::as_f64)
-                    .map(|x| x * x)
-                    .sum::<f64>()
-                    .sqrt();
-                format!("|F| = {size:.12} N")
+            // One of each pose of a path, or one.
+            Some(f) if f.iter().any(serde_json::Value::is_array) => {
+                let largest = f.iter().map(length).fold(0.0, f64::max);
+                format!("max |F| {largest:.9} N")
             }
+            Some(_) => format!("|F| = {:.12} N", length(&o["force_on_tool_N"])),
             None => o
                 .get("peak_force_N")
                 .and_then(serde_json::Value::as_f64)
@@ -145,6 +146,13 @@ fn brief(value: &serde_json::Value) -> String {
         }
         serde_json::Value::Null => "-".to_owned(),
     }
+}
+
+/// Of a vector.
+fn length(value: &serde_json::Value) -> f64 {
+    let mut numbers = Vec::new();
+    flatten(value, &mut numbers);
+    numbers.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
 fn flatten(value: &serde_json::Value, into: &mut Vec<f64>) {

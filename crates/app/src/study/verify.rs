@@ -10,6 +10,7 @@ mod contact_case;
 mod elastic_case;
 mod expected;
 mod files;
+mod friction_case;
 mod lcp_case;
 mod npy;
 mod schema;
@@ -167,6 +168,7 @@ fn run_element_case(dir: &Path, ui: &Ui<'_>) -> Outcome {
         Kind::Patch | Kind::Static => elastic_case::run(&case, ui),
         Kind::Convergence => elastic_case::run_convergence(&case, ui),
         Kind::Contact => contact_case::run(&case, ui),
+        Kind::ContactFriction => friction_case::run(&case, ui),
         Kind::Error => run_refusal(&case, ui),
     }
 }
@@ -228,6 +230,7 @@ pub fn to_json(results: &[CaseResult]) -> Value {
                     object.insert("expected".into(), q.expected.clone());
                     object.insert("error_rel".into(), json!(q.error_rel));
                     object.insert("tolerance".into(), q.tolerance.clone());
+                    object.insert("informative".into(), json!(q.is_informative()));
                     Value::Object(object)
                 })
                 .collect();

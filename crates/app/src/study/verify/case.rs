@@ -58,6 +58,10 @@ pub(super) struct Case {
     pub(super) contact_group: Option<String>,
     pub(super) tool: Option<RawTool>,
     pub(super) poses: Vec<RawPose>,
+    /// Coulomb's coefficient.
+    pub(super) friction: Option<f64>,
+    /// Increments between two poses of a path, each number walked for itself.
+    pub(super) substeps: Vec<u32>,
     pub(super) iterations: ContactIterations,
     pub(super) undercut: Option<f64>,
     pub(super) expected: Value,
@@ -81,9 +85,11 @@ impl Case {
             )));
         }
         let friction = raw.contact.as_ref().and_then(|c| c.friction);
-        if let Some(friction) = friction.filter(|f| *f != 0.0) {
+        if raw.kind != Kind::ContactFriction
+            && let Some(friction) = friction.filter(|f| *f != 0.0)
+        {
             return Err(Failure::NotSupported(format!(
-                "friction {friction}; contact is frictionless"
+                "friction {friction} in a case of this kind; kind = \"contact-friction\" has it, along a path"
             )));
         }
         let curved = match raw.geometry.as_deref() {
@@ -93,6 +99,7 @@ impl Case {
         };
         let in_case = |what: String| wrong(&path, &what);
         check_numbers(&raw).map_err(in_case)?;
+        let substeps = substeps(&raw).map_err(in_case)?;
         let expected = expected::read(&dir.join("expected.json"), raw.kind)?;
         if let Some(compare) = &raw.compare {
             check_compare(&compare.quantities, &expected, raw.kind).map_err(in_case)?;
@@ -112,6 +119,8 @@ impl Case {
             contact_group: raw.contact.map(|c| c.group),
             tool: raw.tool,
             poses: raw.pose,
+            friction,
+            substeps,
             iterations: iterations(raw.contact_iterations.as_ref())?,
             undercut,
             expected,
@@ -120,11 +129,16 @@ impl Case {
 
     /// Quantities that are asked for: all that are not only informative.
     pub(super) fn quantities(&self) -> impl Iterator<Item = &Value> {
+        self.all_quantities()
+            .filter(|q| q["informative"] != Value::Bool(true))
+    }
+
+    /// With those that are only informative.
+    pub(super) fn all_quantities(&self) -> impl Iterator<Item = &Value> {
         self.expected["quantities"]
             .as_array()
             .map_or(&[][..], Vec::as_slice)
             .iter()
-            .filter(|q| q["informative"] != Value::Bool(true))
     }
 
     /// The rule that a quantity was computed with.
@@ -267,7 +281,22 @@ fn check_numbers(raw: &RawCase) -> Result<(), String> {
     for (k, pose) in raw.pose.iter().enumerate() {
         let of = format!("[[pose]] number {}", k + 1);
         finite(of.clone(), &pose.axis_point)?;
-        finite(of, &pose.axis_direction.unwrap_or_default())?;
+        finite(of.clone(), &pose.axis_direction.unwrap_or_default())?;
+        let turn = pose.turn.unwrap_or_default();
+        finite(of.clone(), &turn)?;
+        if turn.iter().any(|angle| angle.abs() > std::f64::consts::TAU) {
+            return Err(format!(
+                "{of}: turn {turn:?} is of more than a whole turn about an axis; give it in rad, or on several poses"
+            ));
+        }
+    }
+    match raw.contact.as_ref().and_then(|c| c.friction) {
+        Some(mu) if !(mu.is_finite() && mu >= 0.0) => {
+            return Err(format!(
+                "[contact] friction = {mu} must be a number, zero or above"
+            ));
+        }
+        _ => {}
     }
     if let Some(undercut) = raw.handbook.as_ref().and_then(|h| h.undercut) {
         finite("[handbook] undercut".to_owned(), &[undercut])?;
@@ -275,6 +304,44 @@ fn check_numbers(raw: &RawCase) -> Result<(), String> {
     match &raw.field {
         Some(field) if field.length == 0.0 => Err("[field] length must not be zero".to_owned()),
         _ => Ok(()),
+    }
+}
+
+/// Increments of the path of a case with friction; other cases have no path, and a turn there would do nothing.
+fn substeps(raw: &RawCase) -> Result<Vec<u32>, String> {
+    const RANGE: std::ops::RangeInclusive<i64> = 1..=1000;
+    const KIND: &str = "belongs to kind = \"contact-friction\"";
+    if raw.kind != Kind::ContactFriction {
+        if raw.path.is_some() {
+            return Err(format!("[path] {KIND}"));
+        }
+        return match raw.pose.iter().position(|pose| pose.turn.is_some()) {
+            Some(k) => Err(format!("[[pose]] number {}: `turn` {KIND}", k + 1)),
+            None => Ok(Vec::new()),
+        };
+    }
+    if raw.pose.first().is_some_and(|pose| pose.turn.is_some()) {
+        return Err(
+            "[[pose]] number 1: `turn` is of the step that leads to a pose; the path starts here"
+                .to_owned(),
+        );
+    }
+    let listed = match &raw.path {
+        Some(path) if !path.substeps.is_empty() => &path.substeps,
+        _ => {
+            return Err(
+                "[path] substeps is missing: increments between two poses, such as [1, 2]"
+                    .to_owned(),
+            );
+        }
+    };
+    match listed.iter().find(|n| !RANGE.contains(n)) {
+        Some(n) => Err(format!(
+            "[path] substeps: {n} must be a whole number from {} to {}",
+            RANGE.start(),
+            RANGE.end()
+        )),
+        None => Ok(listed.iter().map(|n| *n as u32).collect()),
     }
 }
 

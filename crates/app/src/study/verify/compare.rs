@@ -16,6 +16,7 @@ pub struct Quantity {
     /// As in `expected.json`: `rel` and `abs`.
     pub tolerance: Value,
     within: bool,
+    is_informative: bool,
 }
 
 impl Quantity {
@@ -29,12 +30,22 @@ impl Quantity {
         expected: &Value,
         tolerance: &Value,
     ) -> Self {
+        Self::compare_keys(name, computed, expected, tolerance, &COMPARED_KEYS)
+    }
+
+    /// As [`Self::compare`], with the keys of an object that are compared.
+    pub(super) fn compare_keys(
+        name: &str,
+        computed: Value,
+        expected: &Value,
+        tolerance: &Value,
+        keys: &[&str],
+    ) -> Self {
         let rel = tolerance["rel"].as_f64().unwrap_or(0.0);
         let abs = tolerance["abs"].as_f64().unwrap_or(0.0);
         let pairs = match (expected, &computed) {
             (Value::Object(e), Value::Object(_)) if !e.keys().all(|k| k.parse::<u64>().is_ok()) => {
-                COMPARED_KEYS
-                    .iter()
+                keys.iter()
                     .filter(|key| e.contains_key(**key))
                     .map(|key| {
                         let floor = if *key == "torque_on_tool_Nm" {
@@ -75,6 +86,7 @@ impl Quantity {
             error_rel,
             tolerance: tolerance.clone(),
             within,
+            is_informative: false,
         }
     }
 
@@ -87,6 +99,7 @@ impl Quantity {
             error_rel: if yes { 0.0 } else { 1.0 },
             tolerance: json!({ "abs": 0.0 }),
             within: yes,
+            is_informative: false,
         }
     }
 
@@ -99,6 +112,7 @@ impl Quantity {
             error_rel: if computed == expected { 0.0 } else { 1.0 },
             tolerance: json!({ "abs": 0.0 }),
             within: computed == expected,
+            is_informative: false,
         }
     }
 
@@ -108,9 +122,23 @@ impl Quantity {
         self
     }
 
+    /// Context, or an answer that is not unique: reported with its error, and within if it is there and finite.
+    pub(super) fn informative(self) -> Self {
+        Self {
+            within: has_only_numbers(&self.computed),
+            is_informative: true,
+            ..self
+        }
+    }
+
     /// Whether the quantity is inside its tolerance.
     pub fn is_within(&self) -> bool {
         self.within
+    }
+
+    /// Whether it is only reported.
+    pub fn is_informative(&self) -> bool {
+        self.is_informative
     }
 }
 
@@ -138,13 +166,22 @@ pub(super) const COMPARED_KEYS: [&str; 14] = [
     "max_rotation_rad",
 ];
 
+/// Largest number of a list, or of lists in it.
 fn largest(value: &Value) -> f64 {
-    value
-        .as_array()
-        .into_iter()
-        .flatten()
-        .filter_map(Value::as_f64)
-        .fold(0.0, |a, x| a.max(x.abs()))
+    match value {
+        Value::Array(list) => list.iter().map(largest).fold(0.0, f64::max),
+        _ => value.as_f64().map_or(0.0, f64::abs),
+    }
+}
+
+/// No number that is not finite: JSON has none, and writes null there.
+fn has_only_numbers(value: &Value) -> bool {
+    match value {
+        Value::Null => false,
+        Value::Array(list) => list.iter().all(has_only_numbers),
+        Value::Object(object) => object.values().all(has_only_numbers),
+        _ => true,
+    }
 }
 
 /// Largest difference and largest expected entry, or `None` if the shapes do not fit or a number
@@ -218,6 +255,17 @@ mod tests {
         }
         let contact = json!({"force_on_tool_N": [1.0, 0.0, 0.0]});
         assert!(!Quantity::compare("c", json!({}), &contact, &tolerance).is_within());
+    }
+
+    #[test]
+    fn what_is_only_told_is_within_if_it_is_finite() {
+        let told = |computed: Value| {
+            Quantity::compare("f", computed, &json!([1.0]), &json!({"rel": 1e-6})).informative()
+        };
+        let off = told(json!([2.0]));
+        assert!(off.is_within() && off.is_informative() && off.error_rel == 1.0);
+        assert!(!told(json!([f64::NAN])).is_within());
+        assert!(!told(json!({"a": [[1.0, null]]})).is_within());
     }
 
     #[test]

@@ -18,18 +18,20 @@ use serde_json::{Map, Value, json};
 use super::case::{Case, RawPose};
 use super::elastic_case::Elastic;
 use super::{Failure, Outcome, Quantity};
-use crate::engine::{ContactIterations, ContactPart, Engine, EngineSettings, Plan, StepReport};
+use crate::engine::{
+    ActiveContact, ContactIterations, ContactPart, Engine, EngineSettings, Plan, StepReport,
+};
 use crate::progress::Ui;
 
 /// m. As the reference: planes stand still when no displacement changes by more.
 const STANDSTILL: f64 = 1e-14;
 
 /// A part ready for contact, under one quadrature rule.
-struct Touchable {
-    elastic: Elastic,
-    part: Arc<ContactPart>,
-    candidates: Vec<u32>,
-    tool: Tool,
+pub(super) struct Touchable {
+    pub(super) elastic: Elastic,
+    pub(super) part: Arc<ContactPart>,
+    pub(super) candidates: Vec<u32>,
+    pub(super) tool: Tool,
 }
 
 pub(super) fn run(case: &Case, ui: &Ui<'_>) -> Outcome {
@@ -58,7 +60,7 @@ pub(super) fn run(case: &Case, ui: &Ui<'_>) -> Outcome {
     Ok((String::new(), quantities))
 }
 
-fn touchable(
+pub(super) fn touchable(
     case: &Case,
     path: &Path,
     elastic: Elastic,
@@ -117,7 +119,7 @@ fn tool(case: &Case) -> Result<Tool, Failure> {
     .map_err(|e| Failure::Error(format!("case.toml: [tool]: {e}")))
 }
 
-fn pose(raw: &RawPose) -> Result<DPose3, Failure> {
+pub(super) fn pose(raw: &RawPose) -> Result<DPose3, Failure> {
     let axis = DVec3::from_array(raw.axis_direction.unwrap_or([0.0, 0.0, 1.0]));
     let unit = axis
         .try_normalize()
@@ -183,16 +185,30 @@ fn engine(
     iterations: ContactIterations,
     near_distance: f64,
 ) -> Result<Engine, Failure> {
+    engine_of(&ready.part, &ready.tool, iterations, near_distance, None)
+}
+
+/// An engine whose tool goes where it is told, in one go. `friction`: Coulomb's coefficient, `None` for none.
+pub(super) fn engine_of(
+    part: &Arc<ContactPart>,
+    tool: &Tool,
+    iterations: ContactIterations,
+    near_distance: f64,
+    friction: Option<f64>,
+) -> Result<Engine, Failure> {
     let settings = EngineSettings {
         contact_iterations: iterations,
         displacement_tolerance: STANDSTILL,
         near_distance,
-        max_contacts: ready.part.n_candidates(),
+        max_contacts: part.n_candidates(),
         merge_tolerance: 0.0,
         lcp: lcp::Settings::default(),
         max_stride: f64::INFINITY,
     };
-    let plan = Plan::new(ready.part.clone(), ready.tool.clone(), None, settings);
+    let plan = Plan {
+        friction,
+        ..Plan::new(part.clone(), tool.clone(), None, settings)
+    };
     Engine::new(plan).map_err(|e| Failure::Error(e.to_string()))
 }
 
@@ -270,7 +286,7 @@ fn at_pose(
 
 /// m, tool motion between two equilibria on the way in: a fiftieth of the tool's size, or of the
 /// part's where the tool has no size or is larger.
-fn stride(ready: &Touchable) -> f64 {
+pub(super) fn stride(ready: &Touchable) -> f64 {
     crate::session::part_extent(&ready.elastic.mesh).min(ready.tool.characteristic_size()) / 50.0
 }
 
@@ -307,7 +323,7 @@ fn retreat_direction(ready: &Touchable, pose: &DPose3) -> DVec3 {
     sum.normalize_or_zero()
 }
 
-fn touches_at_rest(ready: &Touchable, pose: &DPose3) -> bool {
+pub(super) fn touches_at_rest(ready: &Touchable, pose: &DPose3) -> bool {
     ready
         .part
         .rest_positions()
@@ -317,8 +333,13 @@ fn touches_at_rest(ready: &Touchable, pose: &DPose3) -> bool {
 
 /// Contact forces on all degrees of freedom of the mesh, N.
 fn nodal_forces(ready: &Touchable, engine: &Engine) -> Vec<f64> {
+    on_all_nodes(ready, engine.active_contacts())
+}
+
+/// The same of contacts that were kept.
+pub(super) fn on_all_nodes(ready: &Touchable, active: &[ActiveContact]) -> Vec<f64> {
     let mut force = vec![0.0; 3 * ready.elastic.mesh.n_nodes()];
-    for c in engine.active_contacts() {
+    for c in active {
         let at = 3 * ready.candidates[c.candidate as usize] as usize;
         force[at..at + 3].copy_from_slice(&c.force_on_part.to_array());
     }

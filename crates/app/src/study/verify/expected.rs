@@ -11,9 +11,15 @@ use serde_json::Value;
 
 use super::Failure;
 use super::case::Kind;
+use super::compare::COMPARED_KEYS;
 use super::files::{text, wrong};
+use super::friction_case::Asked;
 use super::schema::{Shape, below, check, nearest};
 use keys::{FILE, INSERTION_VALUE, LCP_VALUE, MATRIX, POSE_VALUE, QUANTITY, VECTOR, VECTORS};
+use keys::{
+    FRICTIONLESS_COMPARED, PATH_COMPARED, PATH_VALUE, PROBLEM_COMPARED, PROBLEM_VALUE,
+    STATE_COMPARED, STATE_VALUE, SUMMARY_COMPARED, SUMMARY_VALUE,
+};
 
 /// Degrees of quadrature: a conical rule of degree 40 has 9261 points in each element.
 const DEGREES: std::ops::RangeInclusive<u32> = 1..=40;
@@ -31,6 +37,7 @@ enum Form {
     Lcp,
     Insertion,
     OnEachMesh,
+    WithFriction(Asked),
 }
 
 impl Form {
@@ -43,6 +50,7 @@ impl Form {
             (Kind::Convergence, "rate_nodal_rms" | "rate_L2") => Self::Scalar,
             (Kind::Convergence, _) => return None,
             (_, _) if name.starts_with("compliance") => Self::Compliance,
+            (Kind::ContactFriction, _) => Self::WithFriction(Asked::of(name)?.0),
             (Kind::Contact, "catch_edge_stiffness") => Self::EdgeStiffness,
             (Kind::Contact, "deflection_force_fe") => Self::Scalar,
             (Kind::Contact, _) => match name {
@@ -72,6 +80,26 @@ impl Form {
             Self::Lcp => &LCP_VALUE,
             Self::Insertion => &INSERTION_VALUE,
             Self::OnEachMesh => &Shape::List(&Shape::Number),
+            Self::WithFriction(asked) => match asked {
+                Asked::Path { .. } | Asked::Repeated => &PATH_VALUE,
+                Asked::Summary { .. } | Asked::Frictionless => &SUMMARY_VALUE,
+                Asked::State { .. } => &STATE_VALUE,
+                Asked::Problem => &PROBLEM_VALUE,
+            },
+        }
+    }
+
+    /// Of a value that is an object, the keys that are compared.
+    fn compared(self) -> &'static [&'static str] {
+        match self {
+            Self::WithFriction(asked) => match asked {
+                Asked::Path { .. } | Asked::Repeated => &PATH_COMPARED,
+                Asked::Summary { .. } => &SUMMARY_COMPARED,
+                Asked::Frictionless => &FRICTIONLESS_COMPARED,
+                Asked::State { .. } => &STATE_COMPARED,
+                Asked::Problem => &PROBLEM_COMPARED,
+            },
+            _ => &COMPARED_KEYS,
         }
     }
 
@@ -106,6 +134,15 @@ pub(super) fn names(kind: Kind) -> &'static [&'static str] {
             "catch_edge_stiffness",
             "deflection_force_fe",
         ],
+        Kind::ContactFriction => &[
+            "compliance",
+            "path.substeps1",
+            "summary.substeps1",
+            "state.pose1",
+            "frictionless",
+            "repeated",
+            "problem.pose1",
+        ],
         Kind::Patch | Kind::Static | Kind::Error => &[
             "displacement",
             "work_mean_displacement",
@@ -129,7 +166,8 @@ pub(super) fn read(path: &Path, kind: Kind) -> Result<Value, Failure> {
         check_refusal(&expected["expected_error"]).map_err(|e| wrong(path, &e))?;
         return Ok(expected);
     }
-    let quantities = check_quantities(&expected["quantities"]).map_err(|e| wrong(path, &e))?;
+    let quantities =
+        check_quantities(&expected["quantities"], kind).map_err(|e| wrong(path, &e))?;
     for (place, quantity) in quantities {
         let name = quantity["name"].as_str().unwrap_or_default();
         let Some(form) = Form::of(kind, name) else {
@@ -163,8 +201,9 @@ fn check_refusal(expected_error: &Value) -> Result<(), String> {
     Ok(())
 }
 
-/// Quantities that are compared, with their places.
-fn check_quantities(quantities: &Value) -> Result<Vec<(String, &Value)>, String> {
+/// Quantities that are computed, with their places: those that are compared, and on a path with friction also those that
+/// are only told, which must come out finite.
+fn check_quantities(quantities: &Value, kind: Kind) -> Result<Vec<(String, &Value)>, String> {
     const NONE: &str = "a case in which nothing is compared is not right but empty";
     let list = match quantities {
         Value::Array(list) if !list.is_empty() => list,
@@ -176,7 +215,9 @@ fn check_quantities(quantities: &Value) -> Result<Vec<(String, &Value)>, String>
     for (k, quantity) in list.iter().enumerate() {
         let place = format!("quantities[{k}]");
         check(quantity, &QUANTITY, &place)?;
-        if quantity["informative"] != Value::Bool(true) {
+        let name = quantity["name"].as_str().unwrap_or_default();
+        let is_told = kind == Kind::ContactFriction && Form::of(kind, name).is_some();
+        if !is_informative(quantity) || is_told {
             compared.push((place, quantity));
         }
     }
@@ -186,11 +227,16 @@ fn check_quantities(quantities: &Value) -> Result<Vec<(String, &Value)>, String>
     Ok(compared)
 }
 
-/// A quantity that is compared: its value in the form that is computed, a tolerance, and what is needed beside.
+fn is_informative(quantity: &Value) -> bool {
+    quantity["informative"] == Value::Bool(true)
+}
+
+/// A quantity that is computed: its value in that form, a tolerance if it is compared, and what is needed beside.
 fn check_compared(quantity: &Value, form: Form, place: &str) -> Result<(), String> {
     let name = quantity["name"].as_str().unwrap_or_default();
+    let needs_tolerance = !is_informative(quantity);
     for key in ["value", "tolerance"].iter().chain(form.needs()) {
-        if quantity[*key].is_null() {
+        if quantity[*key].is_null() && (*key != "tolerance" || needs_tolerance) {
             return Err(format!(
                 "{place}: {key} is missing; {name:?} is compared and needs it"
             ));
@@ -201,8 +247,11 @@ fn check_compared(quantity: &Value, form: Form, place: &str) -> Result<(), Strin
     check(value, form.shape(), &in_value)?;
     check_quadrature(&quantity["quadrature"], place)?;
     match form {
-        Form::Pose | Form::Insertion => check_any_compared(value, &in_value)?,
         Form::Lcp => check_lcp(value, &in_value)?,
+        Form::WithFriction(Asked::Problem) => check_problem(value, &in_value)?,
+        Form::Pose | Form::Insertion | Form::WithFriction(_) => {
+            check_any_compared(value, form, &in_value)?;
+        }
         Form::Compliance => {
             let n = 3 * length(&quantity["nodes"]);
             let of = format!("three times the {} of {place}.nodes", n / 3);
@@ -211,12 +260,15 @@ fn check_compared(quantity: &Value, form: Form, place: &str) -> Result<(), Strin
         Form::EdgeStiffness => check_edge(quantity, place)?,
         _ => {}
     }
-    check_tolerance(&quantity["tolerance"], value, place)
+    if needs_tolerance {
+        check_tolerance(quantity, form, place)?;
+    }
+    Ok(())
 }
 
 /// An object of which at least one key is compared.
-fn check_any_compared(value: &Value, place: &str) -> Result<(), String> {
-    let is_compared = |key: &String| super::compare::COMPARED_KEYS.contains(&key.as_str());
+fn check_any_compared(value: &Value, form: Form, place: &str) -> Result<(), String> {
+    let is_compared = |key: &String| form.compared().contains(&key.as_str());
     if value.as_object().is_some_and(|o| o.keys().any(is_compared)) {
         Ok(())
     } else {
@@ -226,11 +278,31 @@ fn check_any_compared(value: &Value, place: &str) -> Result<(), String> {
     }
 }
 
+/// Matrix and vectors of a problem with friction: three rows for each node.
+fn check_problem(value: &Value, place: &str) -> Result<(), String> {
+    for key in ["nodes", "friction", "M", "q", "solution_r"] {
+        if value[key].is_null() {
+            return Err(format!("{place}: {key} is missing: the problem needs it"));
+        }
+    }
+    let n = 3 * length(&value["nodes"]);
+    let of = format!("three times the {} of {place}.nodes", n / 3);
+    for key in ["q", "solution_r", "y"] {
+        if !value[key].is_null() && length(&value[key]) != n {
+            return Err(format!(
+                "{place}.{key}: has {} entries, {n} are wanted ({of})",
+                length(&value[key])
+            ));
+        }
+    }
+    check_square(&value["M"], n, &below(place, "M"), &of)
+}
+
 fn check_lcp(value: &Value, place: &str) -> Result<(), String> {
     if value["nodes"].is_null() {
         return Err(format!("{place}: nodes is missing: the nodes of the rows"));
     }
-    check_any_compared(value, place)?;
+    check_any_compared(value, Form::Lcp, place)?;
     let n = length(&value["nodes"]);
     for key in ["q", "solution_z"] {
         if !value[key].is_null() && length(&value[key]) != n {
@@ -309,14 +381,15 @@ pub(super) fn quadrature(rule: &str) -> Result<fem::Quadrature, String> {
     }
 }
 
-fn check_tolerance(tolerance: &Value, value: &Value, place: &str) -> Result<(), String> {
+fn check_tolerance(quantity: &Value, form: Form, place: &str) -> Result<(), String> {
+    let (tolerance, value) = (&quantity["tolerance"], &quantity["value"]);
     if tolerance["rel"].is_null() && tolerance["abs"].is_null() {
         return Err(format!("{place}.tolerance: needs rel or abs, above zero"));
     }
     let Some(abs) = tolerance["abs"].as_f64() else {
         return Ok(());
     };
-    let largest = largest_compared(value);
+    let largest = largest_compared(value, form.compared());
     if largest > 0.0 && abs >= largest {
         return Err(format!(
             "{place}.tolerance.abs: {abs:e} is not below the largest expected number, {largest:e}, so that zero \
@@ -327,16 +400,15 @@ fn check_tolerance(tolerance: &Value, value: &Value, place: &str) -> Result<(), 
 }
 
 /// Largest number of a value; of an object, of the keys that are compared.
-fn largest_compared(value: &Value) -> f64 {
+fn largest_compared(value: &Value, keys: &[&str]) -> f64 {
+    let largest = |value: &Value| largest_compared(value, keys);
     match value {
         Value::Object(object) => object
             .iter()
-            .filter(|(key, _)| {
-                super::compare::COMPARED_KEYS.contains(&key.as_str()) || key.parse::<u64>().is_ok()
-            })
-            .map(|(_, value)| largest_compared(value))
+            .filter(|(key, _)| keys.contains(&key.as_str()) || key.parse::<u64>().is_ok())
+            .map(|(_, value)| largest(value))
             .fold(0.0, f64::max),
-        Value::Array(list) => list.iter().map(largest_compared).fold(0.0, f64::max),
+        Value::Array(list) => list.iter().map(largest).fold(0.0, f64::max),
         _ => value.as_f64().map_or(0.0, f64::abs),
     }
 }

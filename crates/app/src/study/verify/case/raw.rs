@@ -12,8 +12,7 @@ use crate::study::verify::Failure;
 use crate::study::verify::files::wrong;
 
 /// Kinds of cases that other programs have, by what they need.
-const NOT_COMPUTED: [(&str, &str); 4] = [
-    ("contact-friction", "friction"),
+const NOT_COMPUTED: [(&str, &str); 3] = [
     ("contact-nlgeom", "large displacement"),
     ("static-nlgeom", "large displacement"),
     ("gravity", "own weight"),
@@ -27,6 +26,8 @@ pub(in crate::study::verify) enum Kind {
     Static,
     Convergence,
     Contact,
+    #[serde(rename = "contact-friction")]
+    ContactFriction,
     Error,
 }
 
@@ -153,6 +154,16 @@ pub(in crate::study::verify) struct RawPose {
     pub(in crate::study::verify) axis_point: [f64; 3],
     #[serde(alias = "normal")]
     pub(in crate::study::verify) axis_direction: Option<[f64; 3]>,
+    /// rad, rotation vector of the step that leads here.
+    pub(in crate::study::verify) turn: Option<[f64; 3]>,
+}
+
+/// How a path is walked from pose to pose.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawPath {
+    /// Increments between two listed poses; values for each number.
+    pub(super) substeps: Vec<i64>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -198,6 +209,7 @@ pub(super) struct RawCase {
     pub(super) tool: Option<RawTool>,
     #[serde(default)]
     pub(super) pose: Vec<RawPose>,
+    pub(super) path: Option<RawPath>,
     pub(super) handbook: Option<RawHandbook>,
     pub(super) compare: Option<RawCompare>,
     #[serde(rename = "title")]

@@ -142,3 +142,101 @@ pub(in crate::study::verify) const INSERTION_VALUE: Shape = Shape::Object(&[
     ("work_to_zero_J", Shape::Number),
     ("note", Shape::Text),
 ]);
+
+const NUMBERS: Shape = Shape::List(&Shape::Number);
+const BY_POSE: Shape = Shape::List(&VECTOR);
+
+/// Value of a path with friction: one entry for each listed pose.
+pub(in crate::study::verify) const PATH_VALUE: Shape = Shape::Object(&[
+    ("force_on_tool_N", BY_POSE),
+    ("torque_on_tool_Nm", BY_POSE),
+    ("dissipated_J", NUMBERS),
+    ("elastic_energy_J", NUMBERS),
+    ("work_total_J", NUMBERS),
+    ("normal_force_sum_N", NUMBERS),
+    ("sticking", Shape::Any),
+    ("slipping", Shape::Any),
+    ("note", Shape::Text),
+]);
+
+/// How many nodes stick or slip is not unique: one without force makes it round-off.
+pub(in crate::study::verify) const PATH_COMPARED: [&str; 6] = [
+    "force_on_tool_N",
+    "torque_on_tool_Nm",
+    "dissipated_J",
+    "elastic_energy_J",
+    "work_total_J",
+    "normal_force_sum_N",
+];
+
+/// Value of the peaks and totals of a path; without friction with the forces beside.
+pub(in crate::study::verify) const SUMMARY_VALUE: Shape = Shape::Object(&[
+    ("axis", Shape::Choice(&["x", "y", "z"])),
+    ("peak_force_N", Shape::Number),
+    ("peak_pose", COUNT),
+    ("peak_at_m", Shape::Number),
+    ("min_force_N", Shape::Number),
+    ("min_pose", COUNT),
+    ("min_at_m", Shape::Number),
+    ("dissipated_total_J", Shape::Number),
+    ("work_total_J", Shape::Number),
+    ("force_on_tool_N", BY_POSE),
+    ("note", Shape::Text),
+]);
+
+pub(in crate::study::verify) const SUMMARY_COMPARED: [&str; 8] = [
+    "peak_force_N",
+    "peak_pose",
+    "peak_at_m",
+    "min_force_N",
+    "min_pose",
+    "min_at_m",
+    "dissipated_total_J",
+    "work_total_J",
+];
+
+/// What friction takes is none here, and the work of a closed way is none: round-off of both programs.
+pub(in crate::study::verify) const FRICTIONLESS_COMPARED: [&str; 7] = [
+    "force_on_tool_N",
+    "peak_force_N",
+    "peak_pose",
+    "peak_at_m",
+    "min_force_N",
+    "min_pose",
+    "min_at_m",
+];
+
+/// Value of a pose of a path with friction.
+pub(in crate::study::verify) const STATE_VALUE: Shape = Shape::Object(&[
+    ("pose", Shape::Any),
+    ("force_on_tool_N", VECTOR),
+    ("torque_on_tool_Nm", VECTOR),
+    ("sample_displacement_m", VECTORS),
+    ("active", Shape::Any),
+    ("certificate", Shape::Any),
+    ("smallest_gap_of_all_contact_nodes_m", Shape::Number),
+    ("checks", Shape::Any),
+    ("note", Shape::Text),
+]);
+
+/// Forces and slips of single nodes are not unique where a node carries no force.
+pub(in crate::study::verify) const STATE_COMPARED: [&str; 3] = [
+    "force_on_tool_N",
+    "torque_on_tool_Nm",
+    "sample_displacement_m",
+];
+
+/// Value of the problem of one increment.
+pub(in crate::study::verify) const PROBLEM_VALUE: Shape = Shape::Object(&[
+    ("nodes", Shape::List(&COUNT)),
+    ("frames", Shape::Any),
+    ("friction", Shape::NotNegative),
+    ("M", MATRIX),
+    ("q", NUMBERS),
+    ("solution_r", NUMBERS),
+    ("y", NUMBERS),
+    ("residual", Shape::NotNegative),
+    ("note", Shape::Text),
+]);
+
+pub(in crate::study::verify) const PROBLEM_COMPARED: [&str; 2] = ["solution_r", "y"];

@@ -211,6 +211,101 @@ fn lengths_that_do_not_agree_are_named_both() {
     }
 }
 
+/// Of paths with friction: keys, names and lengths, also where a quantity is only told.
+#[test]
+fn quantities_of_a_path_with_friction_are_checked() {
+    let problem = json!({"nodes": [7], "friction": 0.3, "q": [-1e-5, 0, 0], "solution_r": [1, 0, 0],
+        "M": [[1e-5, 0, 0], [0, 1e-5, 0], [0, 0, 1e-5]]});
+    let but = |key: &str, value: Value| {
+        let mut problem = problem.clone();
+        problem[key] = value;
+        problem
+    };
+    let cases = [
+        (
+            "problem.pose2",
+            but("q", json!([1, 2])),
+            "value.q: has 2 entries, 3 are wanted",
+        ),
+        (
+            "problem.pose2",
+            but("M", json!([[1]])),
+            "value.M: has 1 rows, 3 are wanted",
+        ),
+        (
+            "problem.pose2",
+            but("friction", json!(-0.1)),
+            "friction: -0.1 must be a number, zero or above",
+        ),
+        (
+            "problem.pose2",
+            json!({"nodes": [7]}),
+            "friction is missing",
+        ),
+        (
+            "path.substeps1",
+            json!({"forces_on_tool_N": []}),
+            "the nearest is `force_on_tool_N`",
+        ),
+        (
+            "path.substeps1",
+            json!({"sticking": [1]}),
+            "none of its keys is compared",
+        ),
+        (
+            "path.substeps1",
+            json!({"dissipated_J": []}),
+            "a list of one entry or more",
+        ),
+        (
+            "path.points-4.substeps1",
+            json!({"force_on_tool_N": [1, 2]}),
+            "[0]: 1 must be a list of 3",
+        ),
+        (
+            "summary.substeps1",
+            json!({"axis": "r"}),
+            "must be one of \"x\", \"y\", \"z\"",
+        ),
+        (
+            "summary.substeps1",
+            json!({"peak_pose": 0}),
+            "peak_pose: 0 must be a whole number from 1",
+        ),
+        (
+            "frictionless",
+            json!({"dissipated_total_J": 0}),
+            "none of its keys is compared",
+        ),
+        (
+            "state.points-5.pose1",
+            json!({}),
+            "quantity \"state.points-5.pose1\" in a case of this kind",
+        ),
+        (
+            "paths.substeps1",
+            json!({}),
+            "the nearest is `path.substeps1`",
+        ),
+    ];
+    for (name, value, words) in cases {
+        let quantity = json!({"name": name, "value": value, "tolerance": {"rel": 1e-6}});
+        let file = json!({"quantities": [quantity]});
+        let message = message(Kind::ContactFriction, &file);
+        assert!(message.contains(words), "{words}: {message}");
+    }
+    let told = |name: &str, value: &Value| {
+        let quantity = json!({"name": name, "value": value, "informative": true});
+        outcome(Kind::ContactFriction, &json!({"quantities": [quantity]}))
+    };
+    assert!(
+        told("problem.pose2", &problem).is_ok(),
+        "no tolerance is wanted"
+    );
+    assert!(told("problem.pose2", &but("M", json!([[1]]))).is_err());
+    assert!(told("handbook", &json!({})).is_err(), "nothing is computed");
+}
+
 #[test]
 fn a_refusal_that_need_not_name_anything_is_refused() {
     for (file, words) in [
@@ -258,6 +353,10 @@ fn every_key_is_in_the_document() {
         &POSE_VALUE,
         &LCP_VALUE,
         &INSERTION_VALUE,
+        &PATH_VALUE,
+        &SUMMARY_VALUE,
+        &STATE_VALUE,
+        &PROBLEM_VALUE,
         &crate::study::verify::lcp_case::PROBLEM,
     ];
     for shape in shapes {

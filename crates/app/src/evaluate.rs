@@ -92,7 +92,7 @@ impl Story<'_> {
         let verdicts: Vec<Verdict> = judge(&self.observed(max_rotation))
             .into_iter()
             .map(|verdict| self.as_simulated(verdict, &part_curve))
-            .filter(|v| choice(scene, v.effect) == EffectChoice::Auto || v.missing)
+            .filter(|v| choice(scene, v.effect) != EffectChoice::Off || v.missing)
             .collect();
         let way = recording.records.iter().map(|r| r.travel);
         let way = way.fold(0.0, f64::max);

@@ -45,24 +45,40 @@ impl Local {
         answer(self.projected(), State::Slip, direction)
     }
 
-    /// The force that stops all motion, -W⁻¹ b. None where W is singular.
+    /// The force that stops all motion, W λ = -b; of several the one with the least tangential part. None if there is none.
     fn stick(&self) -> Option<[f64; 3]> {
+        /// Of the tangential compliances: below a pivot is round-off.
+        const SINGULAR: f64 = 64.0 * f64::EPSILON;
+        /// Of the largest |b|: motion that is round-off.
+        const NO_MOTION: f64 = 1e-13;
         let w = &self.w;
-        let minor = |a: usize, b: usize, c: usize, d: usize| w[a][c] * w[b][d] - w[a][d] * w[b][c];
-        let first_row = [minor(1, 2, 1, 2), -minor(1, 2, 0, 2), minor(1, 2, 0, 1)];
-        let determinant = w[0][0] * first_row[0] + w[0][1] * first_row[1] + w[0][2] * first_row[2];
-        let size = w[0][0] * w[1][1] * w[2][2];
-        if determinant <= 64.0 * f64::EPSILON * size {
-            return None;
-        }
-        let adjugate = [
-            first_row,
-            [first_row[1], minor(0, 2, 0, 2), -minor(0, 2, 0, 1)],
-            [first_row[2], -minor(0, 2, 0, 1), minor(0, 1, 0, 1)],
-        ];
-        Some(adjugate.map(|row| {
-            -(row[0] * self.b[0] + row[1] * self.b[1] + row[2] * self.b[2]) / determinant
-        }))
+        // What is left of the tangent plane when the gap stays closed: T λ_t = -g.
+        let per = [w[0][1] / w[0][0], w[0][2] / w[0][0]];
+        let [x, y] = [1, 2].map(|k| w[k][k] - w[k][0] * per[k - 1]);
+        let cross = w[1][2] - w[1][0] * per[1];
+        let g = [1, 2].map(|k| self.b[k] - w[k][0] * (self.b[0] / w[0][0]));
+        let determinant = x * y - cross * cross;
+        let drag = if determinant > SINGULAR * w[1][1] * w[2][2] {
+            [
+                (cross * g[1] - y * g[0]) / determinant,
+                (cross * g[0] - x * g[1]) / determinant,
+            ]
+        } else {
+            // Along the one direction that gives way, if any.
+            let v = unit(0.5 * cross.atan2(0.5 * (x - y)));
+            let compliance = v[0] * v[0] * x + v[1] * v[1] * y + 2.0 * v[0] * v[1] * cross;
+            let motion = v[0] * g[0] + v[1] * g[1];
+            let is_none = compliance <= SINGULAR * w[1][1].max(w[2][2]).max(w[0][0]);
+            let force = if is_none { 0.0 } else { -motion / compliance };
+            let left = [0, 1].map(|k| g[k] - if is_none { 0.0 } else { motion * v[k] });
+            let most = self.b.iter().fold(0.0, |max: f64, b| max.max(b.abs()));
+            if left[0].hypot(left[1]) > NO_MOTION * most {
+                return None;
+            }
+            [force * v[0], force * v[1]]
+        };
+        let normal = -self.b[0] / w[0][0] - per[0] * drag[0] - per[1] * drag[1];
+        Some([normal, drag[0], drag[1]])
     }
 
     /// A force on the cone with a closed gap and slip against its tangential part.

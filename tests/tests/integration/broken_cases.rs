@@ -96,6 +96,11 @@ fn each_broken_case_is_named_and_the_others_run() {
 
 /// Changes one file of a case that is right; the refusal must have these words.
 fn refused_after(case: &str, file: &str, change: impl Fn(&Path), words: &str) {
+    refused_with(case, file, change, words, file);
+}
+
+/// As [`refused_after`], with words in the place of the file's name.
+fn refused_with(case: &str, file: &str, change: impl Fn(&Path), words: &str, named: &str) {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("case");
     copy(&root().join("tests/cases").join(case), &path);
@@ -103,7 +108,7 @@ fn refused_after(case: &str, file: &str, change: impl Fn(&Path), words: &str) {
     let outcome = verify(&path);
     assert_eq!(outcome.code, 1, "{words}: {}{}", outcome.out, outcome.err);
     assert!(outcome.out.contains(words), "{words}: {}", outcome.out);
-    assert!(outcome.out.contains(file), "{file}: {}", outcome.out);
+    assert!(outcome.out.contains(named), "{named}: {}", outcome.out);
 }
 
 /// Replaces text that is there.
@@ -237,6 +242,122 @@ fn misspelt_keys_of_all_files_are_named() {
         "{}",
         outcome.out
     );
+}
+
+#[test]
+fn a_path_with_friction_that_is_wrong_is_refused_by_key_and_mend() {
+    let case = "hard-redundant-friction";
+    let first = "point = [0.0, -6e-06, 0.0]";
+    for (from, to, words) in [
+        (
+            "friction = 0.3",
+            "friction = -0.1",
+            "[contact] friction = -0.1 must be a number, zero or above",
+        ),
+        (
+            "friction = 0.3",
+            "friction = nan",
+            "[contact] friction = NaN must be",
+        ),
+        (
+            "substeps = [1, 2]",
+            "substeps = [1, 0]",
+            "[path] substeps: 0 must be a whole number from 1 to 1000",
+        ),
+        (
+            "substeps = [1, 2]",
+            "substeps = [1001]",
+            "1001 must be a whole number from 1 to 1000",
+        ),
+        (
+            "substeps = [1, 2]",
+            "substeps = [-1]",
+            "-1 must be a whole number from 1 to 1000",
+        ),
+        (
+            "substeps = [1, 2]",
+            "substeps = []",
+            "[path] substeps is missing",
+        ),
+        ("substeps = [1, 2]", "", "missing field `substeps`"),
+        (
+            "[path]\nsubsteps = [1, 2]",
+            "#",
+            "[path] substeps is missing",
+        ),
+        (
+            "substeps = [1, 2]",
+            "substep = [1]",
+            "unknown field `substep`",
+        ),
+        (
+            "turn = [0.0, 0.004, 0.0]",
+            "turn = [0.0, inf, 0.0]",
+            "[[pose]] number 15: inf is no number",
+        ),
+        (
+            "turn = [0.0, 0.004, 0.0]",
+            "turn = [0.0, 7.0, 0.0]",
+            "number 15: turn [0.0, 7.0, 0.0] is of more than a whole",
+        ),
+        (
+            "turn = [0.0, 0.004, 0.0]",
+            "turn = [0.1, 0.0, 0.0]",
+            "[[pose]] number 15: its direction is 1.0e-1 rad from",
+        ),
+        (
+            first,
+            "point = [0.0, 6e-06, 0.0]",
+            "[[pose]] number 1 overlaps the part",
+        ),
+        (
+            first,
+            "point = [0.0, -6e-06, 0.0]\nturn = [0.0, 0.1, 0.0]",
+            "[[pose]] number 1: `turn` is of the step",
+        ),
+        (
+            "kind = \"contact-friction\"",
+            "kind = \"contact\"",
+            "kind = \"contact-friction\" has it",
+        ),
+    ] {
+        refused_with(case, "case.toml", replace(from, to), words, words);
+    }
+    let contact = "hard-redundant-contacts";
+    for (to, words) in [
+        (
+            "[path]\nsubsteps = [1]\n[tool]",
+            "[path] belongs to kind = \"contact-friction\"",
+        ),
+        ("[tool]", "`turn` belongs to kind = \"contact-friction\""),
+    ] {
+        let change = |path: &Path| {
+            replace("[tool]", to)(path);
+            if to == "[tool]" {
+                replace("[[pose]]", "[[pose]]\nturn = [0.0, 0.1, 0.0]")(path);
+            }
+        };
+        refused_after(contact, "case.toml", change, words);
+    }
+    for (from, to, words) in [
+        (
+            "path.substeps2",
+            "path.substeps3",
+            "path.substeps3: [path] substeps of case.toml is [1, 2]; add 3",
+        ),
+        (
+            "state.pose34",
+            "state.pose35",
+            "state.pose35: case.toml has [[pose]] number 1 to 34",
+        ),
+        (
+            "\"dissipated_J\": [",
+            "\"dissipated_J\": [0.0, ",
+            "dissipated_J has 35 entries, case.toml has 34 [[pose]]",
+        ),
+    ] {
+        refused_after(case, "expected.json", replace(from, to), words);
+    }
 }
 
 #[test]

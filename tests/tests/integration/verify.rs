@@ -24,6 +24,8 @@ fn every_case_is_within_its_tolerance() {
         "patch-tet10",
         "cantilever-tet10-nu030",
         "clip-coarse",
+        "clip-coarse-friction-reversal",
+        "hard-redundant-friction",
         "error-no-fixed",
         "lcp/fathi-16",
     ];
@@ -73,6 +75,34 @@ fn a_wrong_expectation_fails_with_exit_code_1() {
     let result = snapin(&["verify", arg(dir.path())]);
     assert_eq!(result.code, 1, "{}", result.out);
     assert!(result.out.contains("FAIL strain_energy"), "{}", result.out);
+}
+
+/// An answer that is not unique is given as context: whatever it is, it is told, and must be finite.
+#[test]
+fn a_path_of_which_all_is_informative_is_told_with_its_error() {
+    let dir = tempfile::tempdir().unwrap();
+    let source = root().join("tests/cases/hard-redundant-friction");
+    for file in ["case.toml", "mesh.msh"] {
+        std::fs::copy(source.join(file), dir.path().join(file)).unwrap();
+    }
+    let text = std::fs::read_to_string(source.join("expected.json")).unwrap();
+    let mut expected: Value = serde_json::from_str(&text).unwrap();
+    for quantity in expected["quantities"].as_array_mut().unwrap() {
+        quantity["informative"] = true.into();
+        if quantity["name"] == "summary.substeps1" {
+            quantity["value"]["peak_force_N"] = 5.0.into();
+        }
+    }
+    std::fs::write(dir.path().join("expected.json"), expected.to_string()).unwrap();
+    let result = snapin(&["verify", arg(dir.path())]);
+    assert_eq!(result.code, 0, "{}", result.out);
+    for words in [
+        "all quantities are informative",
+        "told summary.substeps1",
+        "error 4.9e-1",
+    ] {
+        assert!(result.out.contains(words), "{words}: {}", result.out);
+    }
 }
 
 /// The polygonal form of friction, a problem that the solver is not made for.

@@ -48,6 +48,35 @@ centre = [0.03, 0.005, 0.0148]
 undercut = 1e-3
 ";
 
+/// A wall that comes down on the bar, slides and turns.
+const FRICTION_TOML: &str = "\
+kind = \"contact-friction\"
+mesh = \"mesh.msh\"
+contact_iterations = \"converged\"
+[material]
+E = 2.3e9
+nu = 0.35
+[fixed]
+group = \"left\"
+[contact]
+group = \"top\"
+friction = 0.3
+[tool]
+shape = \"half-space\"
+[path]
+substeps = [1, 2]
+[[pose]]
+point = [0.02, 0.005, 0.0101]
+normal = [0.0, 0.0, -1.0]
+[[pose]]
+point = [0.02, 0.005, 0.0099]
+normal = [0.0, 0.0, -1.0]
+[[pose]]
+point = [0.0201, 0.005, 0.0099]
+normal = [0.0, 0.0, -1.0]
+turn = [0.0, 0.0, 0.01]
+";
+
 /// A bar held at one end, 40 x 10 x 10 mm.
 fn mesh() -> String {
     let at = |axis: usize, place: f64| {
@@ -93,6 +122,26 @@ fn contact_expected() -> Value {
             {"name": "catch_edge_stiffness", "edge_nodes": [4, 8], "edge_weights": [0.5, 0.5], "value": 2000,
              "tolerance": {"rel": 0.5}},
             {"name": "deflection_force_fe", "value": 2, "tolerance": {"rel": 0.5}},
+        ],
+    })
+}
+
+fn friction_expected() -> Value {
+    let vectors = [[0, 0, 0], [0, 0, 9], [1, 0, 9]];
+    json!({
+        "quantities": [
+            {"name": "path.degree-2.substeps2", "tolerance": {"rel": 0.5}, "value": {
+                "force_on_tool_N": vectors, "torque_on_tool_Nm": vectors, "dissipated_J": [0, 0, 1e-4],
+                "elastic_energy_J": [0, 1e-3, 1e-3], "work_total_J": [0, 1e-3, 1e-3], "normal_force_sum_N": [0, 9, 9]}},
+            {"name": "summary.substeps1", "tolerance": {"rel": 0.5}, "value": {
+                "axis": "z", "peak_force_N": 9, "peak_pose": 2, "peak_at_m": 0.0099, "dissipated_total_J": 1e-4}},
+            {"name": "state.pose3", "tolerance": {"rel": 0.5}, "value": {
+                "force_on_tool_N": [1, 0, 9], "sample_displacement_m": {"12": [0, 0, -1e-5]}}},
+            {"name": "frictionless", "tolerance": {"rel": 0.5}, "value": {"axis": "z", "peak_force_N": 9}},
+            {"name": "repeated", "informative": true, "value": {"force_on_tool_N": vectors}},
+            {"name": "problem.pose2", "tolerance": {"rel": 0.5}, "value": {
+                "nodes": [11], "friction": 0.3, "q": [-1e-5, 0, 0], "solution_r": [1, 0, 0], "y": [0, 0, 0],
+                "M": [[1e-5, 0, 0], [0, 1e-5, 0], [0, 0, 1e-5]]}},
         ],
     })
 }
@@ -143,6 +192,7 @@ fn write_cases(dir: &Path) {
     for (name, toml, expected) in [
         ("static", STATIC_TOML, static_expected()),
         ("contact", CONTACT_TOML, contact_expected()),
+        ("friction", FRICTION_TOML, friction_expected()),
     ] {
         let case = dir.join(name);
         fs::create_dir_all(&case).unwrap();
@@ -263,7 +313,7 @@ fn damaged_cases_are_read_or_refused() {
     let dir = tempfile::tempdir().unwrap();
     let whole = tempfile::tempdir().unwrap();
     write_cases(whole.path());
-    let cases = ["static", "contact", "lcp", "sequence"];
+    let cases = ["static", "contact", "friction", "lcp", "sequence"];
     for seed in seeds(600) {
         let mut random = Random::new(seed);
         let name = random.pick(&cases);

@@ -20,12 +20,20 @@
 //!
 //! # Method
 //!
-//! From the frictionless answer: sweeps over the contacts, each solved exactly for its three forces while the others
-//! stand still (non-smooth Gauss-Seidel), then Newton steps on all closed contacts together. Newton ends in a few
-//! steps once the sweeps have found who sticks and who slips; a step that does not lower the residual is not taken, and the
-//! sweeps go on. For one contact there are three cases: open; stick, if the force that stops all motion is inside
-//! the cone; else slip, where the direction of slip is a root of a trigonometric polynomial of degree two, found to
-//! round-off. With all coefficients zero the answer is that of [`crate::lcp`] and nothing else is computed.
+//! Newton's method on all closed contacts together, from the forces of the step before or from the frictionless answer.
+//! Each step opens, closes, holds or releases contacts as forces and gaps then tell (semi-smooth), and a sticking contact has
+//! three unknowns, a slipping one two. While no contact changes what it does, the factor of the step before serves again.
+//! Where that does not end: normal forces and friction in turns, then sweeps over the contacts, each solved exactly for
+//! its three forces while the others stand still (non-smooth Gauss-Seidel), and Newton's method again. The best forces
+//! seen are given. With all coefficients zero the answer is that of [`crate::lcp`] and nothing else is computed.
+//!
+//! For one contact there are three cases: open; stick, if the force that stops all motion is inside the cone; else slip,
+//! where the direction of slip is a root of a trigonometric polynomial of degree two, found to round-off.
+//!
+//! W may be singular. Contacts given twice share their force: where a pivot has no digits, 1e-9 of the diagonal is added, and
+//! the next steps take away what that changed. A contact that no force moves along some direction of its tangent plane carries no
+//! force along it, and sticks if it does not move along it either. One that no force moves at all is without force; if it
+//! overlaps there is no solution, and the certificate says so.
 //!
 //! The answer is unique for small coefficients. For large ones there may be none, or several, as when a part wedges: then
 //! the answer is the best seen and [`Status::Budget`] says so.

@@ -28,7 +28,7 @@ use faer::perm::PermRef;
 use faer::{Accum, MatMut, MatRef, Par, Spec};
 
 use super::contacts::Contacts;
-use super::{Problem, State};
+use super::{Problem, State, cone};
 
 /// Of the diagonal entry: a pivot below has no digits left, as when two rows are the same.
 const SINGULAR: f64 = 1e-11;
@@ -356,7 +356,7 @@ impl Scratch {
             forces[row + 1] += normal.drag[0] * step;
             forces[row + 2] += normal.drag[1] * step;
             let most = normal.friction_coefficient * forces[row].max(0.0);
-            let length = forces[row + 1].hypot(forces[row + 2]);
+            let length = cone::tangential(&[0.0, forces[row + 1], forces[row + 2]]);
             let scale = if length > 0.0 { most / length } else { 0.0 };
             forces[row + 1] *= scale;
             forces[row + 2] *= scale;
@@ -371,7 +371,8 @@ fn across(d: [f64; 2]) -> [f64; 2] {
 /// The entries of a column of W that the unknowns see.
 fn gather(column: &[f64], unknowns: &[Unknown], target: &mut [f64]) {
     for (target, unknown) in target.iter_mut().zip(unknowns) {
-        let row = unknown.row as usize;
-        *target = unknown.along[0] * column[row] + unknown.along[1] * column[row + 1];
+        // One check of bounds for both.
+        let pair = &column[unknown.row as usize..][..2];
+        *target = unknown.along[0] * pair[0] + unknown.along[1] * pair[1];
     }
 }

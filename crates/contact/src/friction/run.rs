@@ -179,6 +179,12 @@ impl Run<'_> {
             scratch.start[..n_rows].copy_from_slice(self.forces);
             self.newton(scratch, &mut best);
         }
+        if best.residual > GOAL && self.may_step() {
+            self.forces.copy_from_slice(&scratch.start[..n_rows]);
+            self.update_gaps();
+            self.alternate(scratch)?;
+            self.newton(scratch, &mut best);
+        }
         while self.sweeps < self.settings.max_sweeps && best.residual > GOAL && !self.is_over() {
             self.forces.copy_from_slice(&scratch.start[..n_rows]);
             self.update_gaps();
@@ -190,7 +196,7 @@ impl Run<'_> {
             let before = best.residual;
             best.see(self, &mut scratch.best);
             scratch.start[..n_rows].copy_from_slice(self.forces);
-            if self.newton_steps < self.settings.max_newton_steps {
+            if self.may_step() {
                 // Sweeps are slow to tell who is open where the part is slender.
                 self.find_normal_forces(scratch)?;
                 self.update_gaps();
@@ -204,6 +210,17 @@ impl Run<'_> {
             self.forces.copy_from_slice(&scratch.best[..n_rows]);
             self.update_gaps();
             scratch.contacts.find(self.problem, self.u, self.forces);
+        }
+        Ok(())
+    }
+
+    /// Friction as large as the normal forces allow, then normal forces with that friction, in turns.
+    fn alternate(&mut self, scratch: &mut Scratch) -> Result<(), Error> {
+        const TURNS: usize = 3;
+        for _ in 0..TURNS {
+            self.settle(scratch);
+            self.find_normal_forces(scratch)?;
+            self.update_gaps();
         }
         Ok(())
     }
@@ -303,6 +320,10 @@ impl Run<'_> {
 
     fn update_gaps(&mut self) {
         lcp::gaps_into(self.problem.rows(), self.forces, self.u);
+    }
+
+    fn may_step(&self) -> bool {
+        self.newton_steps < self.settings.max_newton_steps && !self.is_over()
     }
 
     fn is_over(&self) -> bool {

@@ -66,6 +66,7 @@ mod cone;
 mod contacts;
 mod local;
 mod newton;
+mod pivots;
 mod problem;
 mod run;
 

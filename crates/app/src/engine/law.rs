@@ -43,7 +43,7 @@ impl ByContact {
 /// What turns gaps into forces.
 #[derive(Debug)]
 pub(super) enum Law {
-    Frictionless(Frictionless),
+    Frictionless(Box<Frictionless>),
     Coulomb(Box<Coulomb>),
 }
 
@@ -72,7 +72,7 @@ impl Law {
         max_rows: usize,
     ) -> Self {
         match friction {
-            None => Self::Frictionless(Frictionless::new(max_near, max_rows)),
+            None => Self::Frictionless(Box::new(Frictionless::new(max_near, max_rows))),
             Some(mu) => {
                 let law = Coulomb::new(mu, n_candidates, n_keys, max_near, max_rows);
                 Self::Coulomb(Box::new(law))

@@ -70,6 +70,11 @@ impl Contacts {
         self.blocks[contact].can_close
     }
 
+    /// Whether it can be held where it is.
+    pub(super) fn can_stick(&self, contact: usize) -> bool {
+        self.blocks[contact].can_stick
+    }
+
     /// How the point gives way along a unit vector in the tangent plane, m/N.
     pub(super) fn compliance(&self, contact: usize, along: [f64; 2]) -> f64 {
         let [x, y, cross] = self.blocks[contact].tangential;
@@ -120,6 +125,17 @@ impl Contacts {
             self.states[contact] = state;
         }
         is_new
+    }
+
+    /// Directions of slipping contacts against their forces.
+    pub(super) fn follow(&mut self, forces: &[f64]) {
+        let triples = forces.as_chunks::<3>().0.iter();
+        for ((force, state), direction) in triples.zip(&self.states).zip(&mut self.directions) {
+            let drag = cone::tangential(force);
+            if *state == State::Slip && drag > 0.0 && force[0] > 0.0 {
+                *direction = [-force[1] / drag, -force[2] / drag];
+            }
+        }
     }
 
     /// The states alone; forces stay.

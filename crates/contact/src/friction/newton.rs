@@ -76,6 +76,8 @@ pub(super) struct Scratch {
     inverse: Vec<u32>,
     stack: Vec<MaybeUninit<u8>>,
     pub(super) is_regularised: bool,
+    /// Whether the directions of slip are held.
+    pub(super) is_straight: bool,
 }
 
 impl Scratch {
@@ -105,6 +107,7 @@ impl Scratch {
             inverse: vec![0; capacity],
             stack: vec![MaybeUninit::uninit(); bytes],
             is_regularised: false,
+            is_straight: false,
         }
     }
 
@@ -172,7 +175,10 @@ impl Scratch {
                     let turning = slip / (mu * normal);
                     let holds = turning + contacts.compliance(contact, across(d));
                     // Without a force yet the direction stays, and where nothing gives way across there is nothing to find.
-                    if turning.is_finite() && holds > contacts.no_compliance(contact) {
+                    if !self.is_straight
+                        && turning.is_finite()
+                        && holds > contacts.no_compliance(contact)
+                    {
                         self.unknowns.push(Unknown {
                             row: first + 1,
                             along: across(d),
@@ -345,11 +351,7 @@ impl Scratch {
 
     /// Adds the step to `forces`. Those of slipping contacts turn on the cone by what is across the slip.
     pub(super) fn add_to(&self, forces: &mut [f64]) {
-        for (unknown, step) in self.unknowns.iter().zip(&self.first) {
-            let row = unknown.row as usize;
-            forces[row] += unknown.along[0] * step;
-            forces[row + 1] += unknown.along[1] * step;
-        }
+        self.add_unknowns_to(forces);
         for (normal, step) in self.normals.iter().zip(&self.second) {
             let row = normal.row as usize;
             forces[row] += step;
@@ -361,6 +363,21 @@ impl Scratch {
             forces[row + 1] *= scale;
             forces[row + 2] *= scale;
         }
+    }
+
+    /// Adds what is not the normal force of a slipping contact.
+    pub(super) fn add_unknowns_to(&self, forces: &mut [f64]) {
+        for (unknown, step) in self.unknowns.iter().zip(&self.first) {
+            let row = unknown.row as usize;
+            forces[row] += unknown.along[0] * step;
+            forces[row + 1] += unknown.along[1] * step;
+        }
+    }
+
+    /// Of slipping contacts: row of the normal force, what it drags along, and its step.
+    pub(super) fn normal_steps(&self) -> impl Iterator<Item = (usize, [f64; 2], f64)> {
+        let steps = self.normals.iter().zip(&self.second);
+        steps.map(|(normal, step)| (normal.row as usize, normal.drag, *step))
     }
 }
 

@@ -12,7 +12,7 @@ const SWEEPS_PER_TRY: usize = 5;
 
 /// Natural residual at which no step more is taken, no unit: 1e-12 is promised, and the next step would cost more than it
 /// gives. Newton's last step usually ends far below.
-const GOAL: f64 = 10.0 * lcp::GOAL;
+pub(super) const GOAL: f64 = 10.0 * lcp::GOAL;
 
 /// Newton steps in a row that may lose: the states change under them.
 const MAX_LOSSES: usize = 4;
@@ -54,6 +54,7 @@ pub(super) fn run(
         per_q,
         sweeps: 0,
         newton_steps: 0,
+        pivots: 0,
     };
     let has_friction = problem.friction_coefficients().iter().any(|mu| *mu > 0.0);
     if !is_warm || !has_friction {
@@ -77,20 +78,22 @@ pub(super) fn run(
         status,
         certificate,
         sweeps: run.sweeps,
-        newton_steps: run.newton_steps,
+        newton_steps: run.newton_steps + run.pivots,
     })
 }
 
-struct Run<'a> {
-    problem: &'a Problem<'a>,
+pub(super) struct Run<'a> {
+    pub(super) problem: &'a Problem<'a>,
     settings: &'a Settings,
-    forces: &'a mut [f64],
+    pub(super) forces: &'a mut [f64],
     /// q + W λ.
-    u: &'a mut [f64],
+    pub(super) u: &'a mut [f64],
     /// 1 / the largest |q|.
-    per_q: f64,
+    pub(super) per_q: f64,
     sweeps: usize,
     newton_steps: usize,
+    /// Factorisations besides.
+    pub(super) pivots: usize,
 }
 
 impl Run<'_> {
@@ -179,11 +182,10 @@ impl Run<'_> {
             scratch.start[..n_rows].copy_from_slice(self.forces);
             self.newton(scratch, &mut best);
         }
-        if best.residual > GOAL && self.may_step() {
+        if best.residual > GOAL && self.settings.max_newton_steps > 0 {
             self.forces.copy_from_slice(&scratch.start[..n_rows]);
             self.update_gaps();
-            self.alternate(scratch)?;
-            self.newton(scratch, &mut best);
+            self.pivot(scratch, &mut best);
         }
         while self.sweeps < self.settings.max_sweeps && best.residual > GOAL && !self.is_over() {
             self.forces.copy_from_slice(&scratch.start[..n_rows]);
@@ -210,17 +212,6 @@ impl Run<'_> {
             self.forces.copy_from_slice(&scratch.best[..n_rows]);
             self.update_gaps();
             scratch.contacts.find(self.problem, self.u, self.forces);
-        }
-        Ok(())
-    }
-
-    /// Friction as large as the normal forces allow, then normal forces with that friction, in turns.
-    fn alternate(&mut self, scratch: &mut Scratch) -> Result<(), Error> {
-        const TURNS: usize = 3;
-        for _ in 0..TURNS {
-            self.settle(scratch);
-            self.find_normal_forces(scratch)?;
-            self.update_gaps();
         }
         Ok(())
     }
@@ -293,7 +284,7 @@ impl Run<'_> {
     }
 
     /// States from the forces, forces as the states want them. True if a state changed.
-    fn settle(&mut self, scratch: &mut Scratch) -> bool {
+    pub(super) fn settle(&mut self, scratch: &mut Scratch) -> bool {
         let contacts = &mut scratch.contacts;
         let is_new = contacts.settle(self.problem, self.u, self.forces);
         if 2 * contacts.moved().len() > contacts.states.len() {
@@ -318,7 +309,7 @@ impl Run<'_> {
         }
     }
 
-    fn update_gaps(&mut self) {
+    pub(super) fn update_gaps(&mut self) {
         lcp::gaps_into(self.problem.rows(), self.forces, self.u);
     }
 
@@ -326,22 +317,22 @@ impl Run<'_> {
         self.newton_steps < self.settings.max_newton_steps && !self.is_over()
     }
 
-    fn is_over(&self) -> bool {
+    pub(super) fn is_over(&self) -> bool {
         let deadline = self.settings.deadline;
         deadline.is_some_and(|deadline| Instant::now() >= deadline)
     }
 }
 
 /// The lowest natural residual seen; its forces are kept.
-struct Best {
-    residual: f64,
+pub(super) struct Best {
+    pub(super) residual: f64,
     /// Whether the forces at hand are the best.
     is_current: bool,
 }
 
 impl Best {
     /// Natural residual of the forces at hand.
-    fn see(&mut self, run: &Run, kept: &mut [f64]) -> f64 {
+    pub(super) fn see(&mut self, run: &Run, kept: &mut [f64]) -> f64 {
         let residual = certificate::natural_residual(run.problem, run.per_q, run.forces, run.u);
         self.is_current = residual < self.residual || self.residual.is_infinite();
         if self.is_current {

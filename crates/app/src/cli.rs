@@ -4,6 +4,7 @@
 mod accuracy;
 mod cache;
 mod doctor;
+mod effects;
 mod prepare;
 mod run;
 mod verify;
@@ -33,6 +34,8 @@ enum Command {
     Run(run::RunArgs),
     /// Show what accuracy costs in time, for each choice: tables, CSV, plots.
     Accuracy(accuracy::AccuracyArgs),
+    /// Show what each physical effect changes and costs, and which are simulated: table, CSV, plot.
+    Effects(effects::EffectsArgs),
     /// Build or check the cached part of a scene; print sizes, times and checks.
     Prepare(prepare::PrepareArgs),
     /// List or clear prepared parts.
@@ -137,6 +140,7 @@ fn command(
     let result = match &cli.command {
         Command::Run(args) => run::run(args, out, &ui),
         Command::Accuracy(args) => accuracy::run(args, out, &ui),
+        Command::Effects(args) => effects::run(args, out, &ui),
         Command::Prepare(args) => prepare::run(args, out, &ui),
         Command::Cache(args) => cache::run(args, out),
         Command::Verify(args) => verify::run(args, out, &ui),

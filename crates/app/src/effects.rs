@@ -12,6 +12,8 @@ mod unseen;
 
 pub use ramp::Ramp;
 
+use crate::scene::{EffectChoice, Effects};
+
 /// A physical effect beyond the quasi-static, frictionless model of small displacements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effect {
@@ -57,6 +59,20 @@ impl Effect {
             Self::PartInertia => "part_inertia",
             Self::Damping => "damping",
             Self::DeformableTool => "deformable_tool",
+        }
+    }
+
+    /// What the scene says of it.
+    pub fn choice(self, effects: &Effects) -> EffectChoice {
+        match self {
+            Self::Friction => effects.friction,
+            Self::LargeRotation => effects.large_rotation,
+            Self::ContinuousCollision => effects.continuous_collision,
+            Self::Gravity => effects.gravity,
+            Self::ToolInertia => effects.tool_inertia,
+            Self::PartInertia => effects.part_inertia,
+            Self::Damping => effects.damping,
+            Self::DeformableTool => effects.deformable_tool,
         }
     }
 

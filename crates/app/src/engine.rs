@@ -130,6 +130,14 @@ impl Engine {
         matches!(self.law, Law::Coulomb(_))
     }
 
+    /// Bytes that are reserved for friction alone; pages that no problem was large enough for are never touched.
+    pub fn friction_bytes(&self) -> usize {
+        match &self.law {
+            Law::Frictionless(_) => 0,
+            Law::Coulomb(coulomb) => coulomb.bytes(),
+        }
+    }
+
     /// m: nodes farther from the tool than this, beyond those that get a contact, can carry none of its force.
     pub fn reach_between_nodes(&self) -> f64 {
         let of_sites = self.near.sites.as_ref().map_or(0.0, |s| s.largest_face());

@@ -27,6 +27,7 @@ use crate::report::{
 use crate::scene::{self, EffectChoice, Scene, ToolShape};
 use crate::session::{Record, Recording, part_extent};
 use crate::shape::Shape;
+pub(crate) use drawing::shortest_edge;
 use moments::Moments;
 
 /// Of the peak, the height of steps from node to node above which they are taken for it.
@@ -92,7 +93,7 @@ impl Story<'_> {
         let verdicts: Vec<Verdict> = judge(&self.observed(max_rotation))
             .into_iter()
             .map(|verdict| self.as_simulated(verdict, &part_curve))
-            .filter(|v| choice(scene, v.effect) != EffectChoice::Off || v.missing)
+            .filter(|v| v.effect.choice(&scene.effects) != EffectChoice::Off || v.missing)
             .collect();
         let way = recording.records.iter().map(|r| r.travel);
         let way = way.fold(0.0, f64::max);
@@ -120,7 +121,7 @@ impl Story<'_> {
         warnings.extend(
             verdicts
                 .iter()
-                .filter_map(|v| words::called_for(v, choice(scene, v.effect))),
+                .filter_map(|v| words::called_for(v, v.effect.choice(&scene.effects))),
         );
         warnings.extend(self.troubles());
         let felt = self.felt.map(|felt| felt.recording);
@@ -221,14 +222,14 @@ impl Story<'_> {
         // What the scene leaves out on purpose is told, and the curve is complete without it. No step of the drive goes
         // through anything: that is a matter of the hand.
         let counts = |v: &&Verdict| {
-            choice(self.scene, v.effect) == EffectChoice::Auto
+            v.effect.choice(&self.scene.effects) == EffectChoice::Auto
                 && v.effect != effects::Effect::ContinuousCollision
         };
         let missing = || effects.iter().filter(counts);
         let friction = missing().find(|v| v.missing && v.effect == effects::Effect::Friction);
         let doubts = Doubts {
             missing_effects: missing()
-                .filter_map(|v| words::called_for(v, choice(self.scene, v.effect)))
+                .filter_map(|v| words::called_for(v, v.effect.choice(&self.scene.effects)))
                 .collect(),
             friction_share: friction.and_then(|v| v.number),
             friction_out_n: friction.and_then(|v| v.added_on_the_way_out),
@@ -410,21 +411,6 @@ fn rate_facts(recording: &Recording) -> RateFacts {
     RateFacts {
         why: recording.rates.why.clone(),
         two,
-    }
-}
-
-fn choice(scene: &Scene, effect: effects::Effect) -> EffectChoice {
-    use effects::Effect;
-    let e = &scene.effects;
-    match effect {
-        Effect::Friction => e.friction,
-        Effect::LargeRotation => e.large_rotation,
-        Effect::Gravity => e.gravity,
-        Effect::ToolInertia => e.tool_inertia,
-        Effect::PartInertia => e.part_inertia,
-        Effect::Damping => e.damping,
-        Effect::ContinuousCollision => e.continuous_collision,
-        Effect::DeformableTool => e.deformable_tool,
     }
 }
 

@@ -170,6 +170,11 @@ impl Scratch {
         }
     }
 
+    /// Numbers that are reserved, about.
+    pub fn n_numbers(&self) -> usize {
+        15 * self.capacity * self.capacity
+    }
+
     /// Largest number of contacts.
     pub fn capacity(&self) -> usize {
         self.capacity

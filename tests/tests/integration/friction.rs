@@ -101,9 +101,10 @@ fn friction_never_gives_energy_and_forces_stay_bounded() {
         let report = engine.step(&target);
         let force = report.contact_force_on_tool().length();
         assert!(force.is_finite() && force < 200.0, "{step}: {force} N");
-        // Round-off of what the forces do.
+        // Round-off of what the forces do; an answer that is not solved says so.
+        let gives = report.dissipated < -1e-12;
         assert!(
-            report.dissipated > -1e-12,
+            !gives || !report.lcp_solved,
             "{step}: {} J",
             report.dissipated
         );
@@ -117,7 +118,7 @@ fn friction_never_gives_energy_and_forces_stay_bounded() {
         touching > STEPS / 2 && largest > 5.0,
         "{touching}, {largest} N"
     );
-    assert!(unsolved * 1000 < STEPS, "{unsolved} of {STEPS}");
+    assert!(unsolved * 10_000 < STEPS, "{unsolved} of {STEPS}");
 }
 
 /// Increments are implicit: the curve changes in proportion to their size.
@@ -323,4 +324,41 @@ fn two_rates_with_friction_are_refused_with_the_mend() {
     let (outcome, _) = run(folder.path(), &format!("[effects]\n{more}"));
     assert_eq!(outcome.code, 2, "{}", outcome.err);
     assert!(outcome.err.contains("accuracy.rates"), "{}", outcome.err);
+}
+
+#[test]
+fn effects_tells_what_friction_changes_and_costs() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = root().join("scenes/clip.toml");
+    let out = folder.path().join("out");
+    let words = [
+        "effects",
+        arg(&scene),
+        "--no-cache",
+        "--json",
+        "--out",
+        arg(&out),
+    ];
+    let outcome = snapin(&words);
+    assert_eq!(outcome.code, 0, "{}", outcome.err);
+    let study: Value = serde_json::from_str(&outcome.out).unwrap();
+    let rows = study["rows"].as_array().unwrap();
+    assert_eq!(rows.len(), 8);
+    let friction = &rows[0];
+    assert_eq!(
+        (&friction["effect"], &friction["decision"]),
+        (&"friction".into(), &"on".into())
+    );
+    let insertion = &friction["insertion"];
+    let share = number(&insertion["on"]) / number(&insertion["off"]) - 1.0;
+    let ratio = number(&friction["number"]) / share;
+    assert!(ratio > 1.0 / 1.5 && ratio < 1.5, "{ratio}");
+    assert!(number(&friction["step_us"]["on"]) > 0.0 && number(&friction["memory"]) > 0.0);
+    for row in &rows[1..] {
+        assert_ne!(row["decision"], "on");
+        assert!(row["insertion"].is_null() && row["step_us"].is_null());
+    }
+    for file in ["effects.csv", "effects.json", "force-travel.svg"] {
+        assert!(out.join(file).is_file(), "{file}");
+    }
 }

@@ -13,7 +13,8 @@ use crate::prepare::budget::duration;
 use crate::prepare::{PrepareOptions, PreparedPart, prepare};
 use crate::progress::Ui;
 use crate::report::part_curve::words;
-use crate::report::{Curve, Driven, RateFacts, Run, summary, write_all};
+use crate::report::plot::short;
+use crate::report::{Curve, Driven, Effect, RateFacts, Run, summary, write_all};
 use crate::scene::Scene;
 use crate::session::{self, Recording};
 use crate::shape::Shape;
@@ -147,15 +148,40 @@ fn text(run: &Run, curve: &Curve, felt: Option<&Session>, target: &std::path::Pa
         ""
     };
     format!(
-        "{}\n{}{}{felt}  prepared in           {}{cached}\n  result                {}\n",
+        "{}\n{}{}{}{felt}  prepared in           {}{cached}\n  result                {}\n",
         run.title,
         run.driven
             .as_ref()
             .map_or_else(String::new, words::terminal),
         run.strain.text(),
+        effects_text(run),
         duration(run.facts.prepare_s),
         target.join("report.html").display(),
     )
+}
+
+/// Which effects are simulated, and how far the others are from being called for.
+fn effects_text(run: &Run) -> String {
+    let size = |effect: &Effect| match effect.number {
+        Some(number) => format!(" ({} of {})", short(number), short(effect.threshold)),
+        None => String::new(),
+    };
+    let told = |is_on: bool| {
+        let all = run.effects.iter().filter(|effect| effect.on == is_on);
+        let all = all.filter(|effect| is_on || effect.number.is_some());
+        let names: Vec<String> = all
+            .map(|effect| effect.name.replace('_', " ") + &size(effect))
+            .collect();
+        names.join(", ")
+    };
+    let (on, off) = (told(true), told(false));
+    let on = if on.is_empty() { "none" } else { &on };
+    let off = if off.is_empty() {
+        String::new()
+    } else {
+        format!("; off: {off}")
+    };
+    format!("  effects               on: {on}{off}\n")
 }
 
 /// What the hand felt, and how long the loop took.

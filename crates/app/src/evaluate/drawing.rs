@@ -69,7 +69,7 @@ fn surface_edges(order: Order, faces: &[Face]) -> Vec<Vec<u32>> {
 }
 
 /// m, between the ends of the shortest element edge on the surface.
-pub(super) fn shortest_edge(mesh: &Mesh) -> f64 {
+pub(crate) fn shortest_edge(mesh: &Mesh) -> f64 {
     surface_edges(mesh.order, &mesh.boundary_faces())
         .iter()
         .map(|line| {

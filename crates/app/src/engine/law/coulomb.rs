@@ -80,6 +80,12 @@ impl Coulomb {
         }
     }
 
+    /// That are reserved.
+    pub(in super::super) fn bytes(&self) -> usize {
+        let numbers = self.w_matrix.len() + 4 * self.q.len() + 3 * self.kept.len();
+        8 * (numbers + self.scratch.n_numbers())
+    }
+
     /// Slip counts from here.
     pub(in super::super) fn begin_step(&mut self, forces: &Forces, tool_pose: DPose3) {
         self.start.forces.copy_from(forces);

@@ -23,9 +23,9 @@
 //! Newton's method on all closed contacts together, from the forces of the step before or from the frictionless answer.
 //! Each step opens, closes, holds or releases contacts as forces and gaps then tell (semi-smooth), and a sticking contact has
 //! three unknowns, a slipping one two. While no contact changes what it does, the factor of the step before serves again.
-//! Where that does not end: normal forces and friction in turns, then sweeps over the contacts, each solved exactly for
-//! its three forces while the others stand still (non-smooth Gauss-Seidel), and Newton's method again. The best forces
-//! seen are given. With all coefficients zero the answer is that of [`crate::lcp`] and nothing else is computed.
+//! Where that does not end: principal pivoting with slip directions held, then Newton steps that change a state only once
+//! directions stand; and that again after sweeps over the contacts, each solved exactly for its three forces while the
+//! others stand still (non-smooth Gauss-Seidel). The best forces seen are given. With all coefficients zero the answer is that of [`crate::lcp`] and nothing else is computed.
 //!
 //! For one contact there are three cases: open; stick, if the force that stops all motion is inside the cone; else slip,
 //! where the direction of slip is a root of a trigonometric polynomial of degree two, found to round-off.
@@ -86,7 +86,8 @@ pub struct Settings {
     pub tolerance: f64,
     /// Sweeps over the contacts, each about 9 n² operations for n contacts. 200.
     pub max_sweeps: usize,
-    /// Newton steps, each a factorisation of the closed contacts' rows: 1 to 3 warm, 2 to 5 cold. 40; 0 leaves the sweeps alone.
+    /// Newton steps before pivots, each a factorisation of the closed contacts' rows: 1 to 3 warm, 2 to 5 cold. 40; 0 leaves the
+    /// sweeps alone. Pivots are bounded by the number of contacts.
     pub max_newton_steps: usize,
     /// When to stop, whatever the other budgets say. None: no clock is read, and equal input gives equal bits.
     pub deadline: Option<Instant>,

@@ -128,7 +128,10 @@ pub fn run(
     ui: &Ui<'_>,
 ) -> Result<Study, Error> {
     let load_average = sysinfo::System::load_average().one;
-    let mut scene = scene.clone();
+    if scene.effects.friction_coefficient.is_some() {
+        ui.note("friction is left out of this study, which weighs errors by the energy that a part gives back");
+    }
+    let mut scene = scene.with_friction(false);
     scene.accuracy.budget_us = None;
     let own_order = store::own_order(&scene)?;
     scene.part.order.get_or_insert(own_order);

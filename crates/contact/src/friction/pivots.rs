@@ -22,7 +22,7 @@ const MOST_TURNS: usize = 6;
 /// Newton steps in which states hardly change, and how many there are between two changes: a contact that contradicts its
 /// state may do so because directions are not found yet.
 const MOST_STEPS: usize = 60;
-const STEPS_BETWEEN: usize = 4;
+const STEPS_BETWEEN: usize = 8;
 
 impl Run<'_> {
     /// From `forces` as they are: states and forces that agree with one another while directions of slip are held, then Newton
@@ -94,7 +94,7 @@ impl Run<'_> {
     }
 
     /// Newton steps from forces that agree with their states.
-    fn newton_one_by_one(&mut self, scratch: &mut Scratch, best: &mut Best) {
+    pub(super) fn newton_one_by_one(&mut self, scratch: &mut Scratch, best: &mut Best) {
         let mut since_change = 0;
         for _ in 0..MOST_STEPS {
             let Scratch {

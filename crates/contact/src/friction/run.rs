@@ -7,8 +7,8 @@ use super::{Problem, Scratch, Settings, Solution, Status, certificate, cone};
 use crate::error::Error;
 use crate::lcp;
 
-/// Sweeps between two tries of Newton's method. The first few find out who sticks.
-const SWEEPS_PER_TRY: usize = 5;
+/// Sweeps before Newton's method is tried again, and then as many again as there were.
+const SWEEPS_BEFORE_TRY: usize = 10;
 
 /// Natural residual at which no step more is taken, no unit: 1e-12 is promised, and the next step would cost more than it
 /// gives. Newton's last step usually ends far below.
@@ -187,25 +187,26 @@ impl Run<'_> {
             self.update_gaps();
             self.pivot(scratch, &mut best);
         }
+        let mut next_try = SWEEPS_BEFORE_TRY;
         while self.sweeps < self.settings.max_sweeps && best.residual > GOAL && !self.is_over() {
             self.forces.copy_from_slice(&scratch.start[..n_rows]);
             self.update_gaps();
-            for _ in 0..SWEEPS_PER_TRY.min(self.settings.max_sweeps - self.sweeps) {
+            while self.sweeps < next_try.min(self.settings.max_sweeps) {
                 self.sweep(scratch);
             }
+            next_try *= 2;
             // From scratch: the updates of the sweeps gather round-off.
             self.update_gaps();
-            let before = best.residual;
             best.see(self, &mut scratch.best);
             scratch.start[..n_rows].copy_from_slice(self.forces);
-            if self.may_step() {
-                // Sweeps are slow to tell who is open where the part is slender.
-                self.find_normal_forces(scratch)?;
+            if self.settings.max_newton_steps > 0 {
+                self.settle(scratch);
+                self.newton_one_by_one(scratch, &mut best);
+            }
+            if self.settings.max_newton_steps > 0 && best.residual > GOAL && !self.is_over() {
+                self.forces.copy_from_slice(&scratch.start[..n_rows]);
                 self.update_gaps();
-                self.newton(scratch, &mut best);
-            } else if best.residual >= before && best.residual <= self.settings.tolerance {
-                // Good enough, and nothing makes it better.
-                break;
+                self.pivot(scratch, &mut best);
             }
         }
         if !best.is_current {

@@ -314,10 +314,6 @@ impl Run<'_> {
         lcp::gaps_into(self.problem.rows(), self.forces, self.u);
     }
 
-    fn may_step(&self) -> bool {
-        self.newton_steps < self.settings.max_newton_steps && !self.is_over()
-    }
-
     pub(super) fn is_over(&self) -> bool {
         let deadline = self.settings.deadline;
         deadline.is_some_and(|deadline| Instant::now() >= deadline)

@@ -203,6 +203,9 @@ fn engine(random: &mut Random, ready: &Ready, tool: &Tool) -> Result<Engine, Str
     scene.accuracy.contact_at = random.pick(&[ContactAt::Nodes, ContactAt::Places]);
     scene.accuracy.tool_features = random.pick(&[ToolFeatures::Auto, ToolFeatures::Off]);
     scene.coupling.translational_stiffness = random.decades(1e2, 1e7);
+    let friction = random.chance(0.4).then(|| random.decades(1e-3, 3.0));
+    let mut scene = scene.with_friction(friction.is_some());
+    scene.effects.friction_coefficient = friction;
     let settings = settings(random, tool, ready.size);
     if random.chance(0.5) {
         scene.accuracy.near_distance = Some(settings.near_distance);
@@ -214,7 +217,10 @@ fn engine(random: &mut Random, ready: &Ready, tool: &Tool) -> Result<Engine, Str
         return setup::engine(&scene, &ready.prepared, tool.clone()).map_err(|e| e.to_string());
     }
     let part = ready.prepared.contact_part();
-    let plan = Plan::new(part, tool.clone(), None, settings);
+    let plan = Plan {
+        friction,
+        ..Plan::new(part, tool.clone(), None, settings)
+    };
     let plan = setup::with_contact(&scene, &ready.prepared, plan).map_err(|e| e.to_string())?;
     Engine::new(plan).map_err(|e| e.to_string())
 }

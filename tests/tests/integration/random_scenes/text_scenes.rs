@@ -32,6 +32,15 @@ fn reach(keys: &str) -> f64 {
     lengths.map(|x| x * x).sum::<f64>().sqrt() + keys.matches("capsule").count() as f64 * 0.1
 }
 
+fn effects_keys(random: &mut Random) -> String {
+    if random.chance(0.5) {
+        return String::new();
+    }
+    let choice = random.pick(&["on", "off", "auto"]);
+    let coefficient = random.decades(1e-3, 3.0);
+    format!("[effects]\nfriction = \"{choice}\"\nfriction_coefficient = {coefficient:?}\n\n")
+}
+
 fn accuracy_keys(random: &mut Random) -> String {
     let mut keys = String::new();
     let mut add = |line: String| keys += &format!("{line}\n");
@@ -93,7 +102,7 @@ fn scene(random: &mut Random, case: &PartCase) -> String {
         "[part]\nmesh = \"{}.msh\"\n{}\nmaterial = {{ young_modulus = {:?}, poisson_ratio = 0.3 }}\n\n\
          [tool]\n{tool}\nposition = {}\naxis = {}\n\n[holds]\nhandle = \"{}\"\n\n\
          [hand]\ndirection = {}\nspeed = {:?}\ntravel = {travel:?}\nretract = {}\n\n\
-         [coupling]\ntranslational_stiffness = {:?}\n\n[accuracy]\n{}\n[output]\nframes = 0\n",
+         [coupling]\ntranslational_stiffness = {:?}\n\n[accuracy]\n{}\n{}[output]\nframes = 0\n",
         case.name,
         case.keys,
         random.decades(1e7, 1e10),
@@ -105,6 +114,7 @@ fn scene(random: &mut Random, case: &PartCase) -> String {
         random.chance(0.3),
         random.decades(1e3, 1e5),
         accuracy_keys(random),
+        effects_keys(random),
     )
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Measures: scenes/clip.toml (about 686 nodes, 293 quadratic elements), the tube pushed in from
 //! first touch to home in 1000 steps of the script, 20 times over; only steps that carry contact
-//! count; contact at nodes, and at places that move with the tube. Printed beside what the paper
+//! count; contact at nodes, at nodes with the scene's friction, and at places that move with the tube. Printed beside what the paper
 //! measured on a Pentium 4 at 2.4 GHz (Duriez et al. 2004, 5.2). `cargo bench -p snapin` runs it on one core.
 
 #![allow(
@@ -33,9 +33,9 @@ struct Clip {
     way: DVec3,
 }
 
-fn clip(contact_at: ContactAt) -> Clip {
+fn clip(contact_at: ContactAt, has_friction: bool) -> Clip {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/clip.toml");
-    let mut scene = Scene::load(&path).unwrap();
+    let mut scene = Scene::load(&path).unwrap().with_friction(has_friction);
     scene.accuracy.contact_at = contact_at;
     let mut unseen = std::io::sink();
     let ui = Ui::new(&mut unseen, false);
@@ -68,13 +68,17 @@ impl Clip {
 
 fn main() {
     println!("{}", Machine::read().summary());
-    for contact_at in [ContactAt::Nodes, ContactAt::Places] {
-        measure(contact_at);
+    for (contact_at, has_friction) in [
+        (ContactAt::Nodes, false),
+        (ContactAt::Nodes, true),
+        (ContactAt::Places, false),
+    ] {
+        measure(contact_at, has_friction);
     }
 }
 
-fn measure(contact_at: ContactAt) {
-    let mut clip = clip(contact_at);
+fn measure(contact_at: ContactAt, has_friction: bool) {
+    let mut clip = clip(contact_at, has_friction);
     let mut stages: Vec<Vec<u64>> = vec![Vec::new(); Stage::ALL.len()];
     let mut totals = Vec::new();
     let (mut passes, mut contacts) = (0, 0);
@@ -97,7 +101,12 @@ fn measure(contact_at: ContactAt) {
         }
     }
     println!(
-        "contact at {contact_at:?}: {} nodes, {} elements; {} steps with contact, on average {:.1} contacts and {:.1} passes",
+        "contact at {contact_at:?}, {}: {} nodes, {} elements; {} steps with contact, on average {:.1} contacts and {:.1} passes",
+        if has_friction {
+            "with friction"
+        } else {
+            "without friction"
+        },
         clip.prepared.loaded.mesh.n_nodes(),
         clip.prepared.loaded.mesh.n_elements(),
         totals.len(),

@@ -14,6 +14,9 @@ const SWEEPS_BEFORE_TRY: usize = 10;
 /// gives. Newton's last step usually ends far below.
 pub(super) const GOAL: f64 = 10.0 * lcp::GOAL;
 
+/// Natural residual at which nothing slower than Newton's method is tried: round-off of large or uneven problems.
+const ENOUGH: f64 = 1e-11;
+
 /// Newton steps in a row that may lose: the states change under them.
 const MAX_LOSSES: usize = 4;
 
@@ -55,6 +58,7 @@ pub(super) fn run(
         sweeps: 0,
         newton_steps: 0,
         pivots: 0,
+        work: 0.0,
     };
     let has_friction = problem.friction_coefficients().iter().any(|mu| *mu > 0.0);
     if !is_warm || !has_friction {
@@ -94,6 +98,8 @@ pub(super) struct Run<'a> {
     newton_steps: usize,
     /// Factorisations besides.
     pub(super) pivots: usize,
+    /// Their operations.
+    pub(super) work: f64,
 }
 
 impl Run<'_> {
@@ -182,13 +188,13 @@ impl Run<'_> {
             scratch.start[..n_rows].copy_from_slice(self.forces);
             self.newton(scratch, &mut best);
         }
-        if best.residual > GOAL && self.settings.max_newton_steps > 0 {
+        if best.residual > ENOUGH && self.settings.max_newton_steps > 0 {
             self.forces.copy_from_slice(&scratch.start[..n_rows]);
             self.update_gaps();
             self.pivot(scratch, &mut best);
         }
         let mut next_try = SWEEPS_BEFORE_TRY;
-        while self.sweeps < self.settings.max_sweeps && best.residual > GOAL && !self.is_over() {
+        while self.sweeps < self.settings.max_sweeps && best.residual > ENOUGH && !self.is_over() {
             self.forces.copy_from_slice(&scratch.start[..n_rows]);
             self.update_gaps();
             while self.sweeps < next_try.min(self.settings.max_sweeps) {
@@ -203,7 +209,7 @@ impl Run<'_> {
                 self.settle(scratch);
                 self.newton_one_by_one(scratch, &mut best);
             }
-            if self.settings.max_newton_steps > 0 && best.residual > GOAL && !self.is_over() {
+            if self.settings.max_newton_steps > 0 && best.residual > ENOUGH && !self.is_over() {
                 self.forces.copy_from_slice(&scratch.start[..n_rows]);
                 self.update_gaps();
                 self.pivot(scratch, &mut best);

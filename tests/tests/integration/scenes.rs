@@ -177,7 +177,7 @@ fn assert_pulls_home(summary: &Value) {
         number(summary, "peak_insertion_force_N"),
         number(summary, "snap_drop_N"),
     );
-    assert!(drop > peak && peak > 0.0, "{peak} {drop}");
+    assert!(drop > 1.2 * peak && peak > 0.0, "{peak} {drop}");
     assert!(number(summary, "max_certificate") < 1e-10);
     // What is put in up to the crest, less what comes back.
     assert!(number(summary, "insertion_work_J") > 0.0);
@@ -214,7 +214,7 @@ fn the_cap_snaps_near_shell_theory_and_between_the_handbooks_bounds() {
     let (rubbing, peak) = peaks(&summary, "insertion");
     // tan(α + φ) / tan α on the ramp that the estimate reads off.
     let ramp = alpha + 0.25f64.atan();
-    assert_near("friction", rubbing / peak, ramp.tan() / alpha.tan(), 0.25);
+    assert_near("friction", rubbing / peak, ramp.tan() / alpha.tan(), 0.12);
     assert_near("shell theory", peak, quarter, 0.10);
     assert_near("scikit-fem, in", peak, 25.1, 0.03);
     let (_, removal) = peaks(&summary, "removal");

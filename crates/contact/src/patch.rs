@@ -215,6 +215,7 @@ impl Patches {
         let m = self.len();
         check_size(w, m)?;
         w.fill(0.0);
+        self.begin_shifts(contacts.len());
         let Self {
             patch_of,
             shares,
@@ -222,10 +223,6 @@ impl Patches {
             own,
             ..
         } = self;
-        shifts.clear();
-        shifts.resize(contacts.len(), 0.0);
-        own.clear();
-        own.resize(contacts.len(), 0.0);
         for_each_entry(compliance, contacts, coupling, |i, j, entry| {
             let (g, h) = (patch_of[i] as usize, patch_of[j] as usize);
             let share = shares[i] * shares[j] * entry;
@@ -242,16 +239,7 @@ impl Patches {
                 own[i] = entry;
             }
         });
-        for (i, shift) in shifts.iter_mut().enumerate() {
-            let g = patch_of[i] as usize;
-            let away = own[i] - 2.0 * *shift + w[g * m + g];
-            *shift = away / (1.0 - shares[i]);
-        }
-        for h in 0..m {
-            for g in 0..h {
-                w[g * m + h] = w[h * m + g];
-            }
-        }
+        self.finish(w, m, 1);
         Ok(())
     }
 
@@ -272,6 +260,7 @@ impl Patches {
         check_frames(frames, contacts.len())?;
         check_size(w, n)?;
         w.fill(0.0);
+        self.begin_shifts(contacts.len());
         let Self {
             patch_of,
             shares,
@@ -279,10 +268,6 @@ impl Patches {
             own,
             ..
         } = self;
-        shifts.clear();
-        shifts.resize(contacts.len(), 0.0);
-        own.clear();
-        own.resize(contacts.len(), 0.0);
         for_each_block(compliance, contacts, frames, coupling, |i, j, block| {
             let (g, h) = (patch_of[i] as usize, patch_of[j] as usize);
             let share = shares[i] * shares[j];
@@ -303,17 +288,29 @@ impl Patches {
                 shifts[j] += shares[i] * entry;
             }
         });
-        for (i, shift) in shifts.iter_mut().enumerate() {
-            let g = 3 * patch_of[i] as usize;
-            let away = own[i] - 2.0 * *shift + w[g * n + g];
-            *shift = away / (1.0 - shares[i]);
+        self.finish(w, n, 3);
+        Ok(())
+    }
+
+    fn begin_shifts(&mut self, n_contacts: usize) {
+        for values in [&mut self.shifts, &mut self.own] {
+            values.clear();
+            values.resize(n_contacts, 0.0);
+        }
+    }
+
+    /// From sums to [`Self::shift`], and the lower triangle of W_r of `n` rows, `each` a patch, of which the first is normal.
+    fn finish(&mut self, w: &mut [f64], n: usize, each: usize) {
+        for (i, shift) in self.shifts.iter_mut().enumerate() {
+            let g = each * self.patch_of[i] as usize;
+            let away = self.own[i] - 2.0 * *shift + w[g * n + g];
+            *shift = away / (1.0 - self.shares[i]);
         }
         for column in 0..n {
             for row in 0..column {
                 w[row * n + column] = w[column * n + row];
             }
         }
-        Ok(())
     }
 
     /// How far the gap of contact `i` opens when a unit of force is shifted to it from its patch as a whole, m/N:

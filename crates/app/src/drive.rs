@@ -9,6 +9,7 @@ mod friction;
 use std::sync::Arc;
 use std::time::Instant;
 
+use contact::friction::Coefficients;
 use contact::tool::Tool;
 use device::Phase;
 use glam::DVec3;
@@ -69,8 +70,8 @@ pub struct Driven {
     pub stopped_at: Option<f64>,
     /// How often the way was gone.
     pub n_rounds: u32,
-    /// Coulomb's coefficient, where friction is in it.
-    pub friction: Option<f64>,
+    /// Coulomb's coefficients, where friction is in it.
+    pub friction: Option<Coefficients>,
     /// By record: what part and springs hold, J.
     pub stored: Vec<f64>,
     /// The same way without friction, where friction is in this one.

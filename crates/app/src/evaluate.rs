@@ -247,8 +247,8 @@ impl Story<'_> {
         };
         let driven = report::Driven::of(self.driven.rows(), &doubts, &limits, strain);
         let source = &self.scene.effects.friction_source;
-        let friction = self.driven.friction.map(|coefficient| {
-            FrictionFacts::of(coefficient, source.clone(), self.driven.plain().rows())
+        let friction = self.driven.friction.map(|coefficients| {
+            FrictionFacts::of(coefficients, source.clone(), self.driven.plain().rows())
         });
         report::Driven { friction, ..driven }
     }
@@ -318,10 +318,10 @@ impl Story<'_> {
 
     /// What an effect that is simulated has changed, in place of what was expected of it.
     fn as_simulated(&self, verdict: Verdict, curve: &PartCurve) -> Verdict {
-        match self.driven.friction {
-            Some(mu) if verdict.effect == effects::Effect::Friction => {
+        match &self.driven.friction {
+            Some(coefficients) if verdict.effect == effects::Effect::Friction => {
                 let plain = PartCurve::of(&self.driven.plain().rows());
-                words::friction_in(verdict, mu, curve, &plain)
+                words::friction_in(verdict, coefficients, curve, &plain)
             }
             _ => verdict,
         }
@@ -348,7 +348,7 @@ impl Story<'_> {
             ramp,
             release,
             has_passed,
-            friction_coefficient: self.scene.effects.friction_coefficient,
+            friction_coefficient: self.scene.effects.largest_friction(),
             motion_per_feature: fastest / feature,
         }
     }

@@ -30,6 +30,7 @@ pub use data::{
     CellKind, ContactForce, DriveRow, Driven, Effect, Facts, Frame, FrictionFacts, Handbook,
     HandbookRow, MultiplyFacts, MultiplyRace, N_STAGES, Outputs, PaperStage, PartDrawing, Phase,
     RateFacts, Run, STAGE_NAMES, StepRow, TwoRateFacts, View, Viewing, Warning,
+    coefficient_in_words,
 };
 pub use error::ReportError;
 pub use origin::{InputFile, Origin};

@@ -47,7 +47,7 @@ use check::Check;
 pub use coupling::Coupling;
 pub use device::{Device, DeviceModel};
 pub use drive::{Drive, Guide};
-pub use effects::{EffectChoice, Effects};
+pub use effects::{EffectChoice, Effects, StaticFriction};
 pub use error::SceneError;
 pub use hand::Hand;
 pub use handbook::Handbook;

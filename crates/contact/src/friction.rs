@@ -62,6 +62,7 @@
 //! the slip equation.
 
 mod certificate;
+mod coefficients;
 mod cone;
 mod contacts;
 mod local;
@@ -73,6 +74,7 @@ mod run;
 use std::time::Instant;
 
 pub use certificate::{Certificate, check};
+pub use coefficients::Coefficients;
 pub use problem::Problem;
 
 use crate::error::Error;

@@ -8,7 +8,7 @@ use glamx::DPose3;
 use serde_json::Value;
 use snapin::engine::{Engine, StepReport};
 use snapin::prepare::PreparedPart;
-use snapin::scene::Scene;
+use snapin::scene::{Scene, StaticFriction};
 use snapin::setup;
 use snapin_tests::{Outcome, arg, csv, root, shipped, snapin};
 
@@ -28,6 +28,17 @@ impl Clip {
         let mut scene = self.scene.with_friction(friction.is_some());
         scene.effects.friction_coefficient = friction;
         scene
+    }
+
+    /// The tube's pose is imposed; static friction falls over 0.05 mm.
+    fn weakening(&self, at_rest: f64, sliding: f64) -> Engine {
+        let mut scene = self.scene(Some(sliding));
+        scene.effects.static_friction = Some(StaticFriction {
+            coefficient: at_rest,
+            weakening_distance: 5e-5,
+        });
+        let (tool, _) = setup::tool(&self.scene).unwrap();
+        setup::drive_engine(&scene, &self.prepared, tool, 200).unwrap()
     }
 
     /// The tube's pose is imposed.
@@ -174,6 +185,49 @@ fn turning_back_sticks_before_it_slips_the_other_way() {
     );
     let after = force_y(&back[5]);
     assert!(after < 0.3 * before, "{before} N, then {after}");
+}
+
+/// Static friction is overcome once; then the tube slides as with kinetic friction alone, until it turns back.
+#[test]
+fn static_friction_holds_until_it_slips_and_again_after_turning_back() {
+    let clip = Clip::new();
+    // In to 11 mm, in steps of 20 um, then back by 0.6 mm in steps of 5 um.
+    let curve = |mut engine: Engine| -> Vec<f64> {
+        let into = (0..=100).map(|k| 13.0 - 0.02 * f64::from(k));
+        let out = (1..=120).map(|k| 11.0 + 0.005 * f64::from(k));
+        let places = into.chain(out);
+        places
+            .map(|y| {
+                let report = engine.step(&clip.at(0.0, y));
+                assert!(report.lcp_solved && report.dissipated > -1e-12, "{y}");
+                force_y(&report)
+            })
+            .collect()
+    };
+    let kinetic = curve(clip.driven(Some(0.2)));
+    let held = curve(clip.driven(Some(0.4)));
+    let both = curve(clip.weakening(0.4, 0.2));
+    assert_eq!(curve(clip.weakening(0.2, 0.2)), kinetic);
+    let (into, end) = (kinetic[100], kinetic.len() - 1);
+    assert!(into > 5.0 && held[100] > 1.2 * into);
+    // Long since sliding, in and out.
+    for at in [100, end] {
+        let scale = into.abs();
+        assert!(
+            (both[at] - kinetic[at]).abs() < 0.01 * scale,
+            "{at}: {} and {}",
+            both[at],
+            kinetic[at]
+        );
+    }
+    // How far the force falls as the tube turns: farther than with kinetic friction, and no farther than static holds.
+    let lowest = |curve: &[f64]| curve[101..].iter().copied().fold(f64::INFINITY, f64::min);
+    let (least, most) = (lowest(&kinetic), lowest(&held));
+    let reached = lowest(&both);
+    assert!(
+        reached < least - 0.25 * (least - most) && reached > most - 1e-3,
+        "{most} {reached} {least}"
+    );
 }
 
 /// A scene of the clip with these effects, run.

@@ -50,7 +50,7 @@ impl Seen {
 /// Whether friction is to be simulated: asked for, or left open with a coefficient that changes the force by more than the
 /// threshold.
 pub(super) fn is_called_for(effects: &Effects, frictionless: &Driven) -> bool {
-    if effects.friction_coefficient.is_none_or(|mu| mu <= 0.0) {
+    if effects.friction_coefficients().is_none() {
         return false;
     }
     match effects.friction {
@@ -66,7 +66,7 @@ pub(super) fn is_called_for(effects: &Effects, frictionless: &Driven) -> bool {
                 ramp,
                 release,
                 has_passed,
-                friction_coefficient: effects.friction_coefficient,
+                friction_coefficient: effects.largest_friction(),
                 ..Observed::default()
             };
             Effect::Friction.judge(&observed).missing

@@ -2,7 +2,9 @@
 
 mod coulomb;
 mod frictionless;
+mod weakening;
 
+use contact::friction::Coefficients;
 use contact::lcp;
 use glam::DVec3;
 use glamx::DPose3;
@@ -63,9 +65,9 @@ pub(super) struct Carried<'a> {
 }
 
 impl Law {
-    /// As [`Rows::new`]. `friction`: Coulomb's coefficient, where there is friction.
+    /// As [`Rows::new`]. `friction`: where there is friction.
     pub(super) fn new(
-        friction: Option<f64>,
+        friction: Option<Coefficients>,
         n_candidates: usize,
         n_keys: usize,
         max_near: usize,
@@ -73,8 +75,8 @@ impl Law {
     ) -> Self {
         match friction {
             None => Self::Frictionless(Box::new(Frictionless::new(max_near, max_rows))),
-            Some(mu) => {
-                let law = Coulomb::new(mu, n_candidates, n_keys, max_near, max_rows);
+            Some(coefficients) => {
+                let law = Coulomb::new(coefficients, n_candidates, n_keys, max_near, max_rows);
                 Self::Coulomb(Box::new(law))
             }
         }

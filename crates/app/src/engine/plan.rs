@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use contact::friction::Coefficients;
 use contact::lcp;
 use contact::surface::Surface;
 use contact::tool::{Features, Tool};
@@ -72,8 +73,8 @@ pub struct Plan {
     pub places: ContactPlaces,
     /// Corners and edges of the tool, that touch these faces between the nodes.
     pub features: Option<(Arc<Surface>, Features)>,
-    /// Coulomb's coefficient between part and tool, >= 0; `None`: no friction, and nothing is built for it.
-    pub friction: Option<f64>,
+    /// Coulomb's coefficients between part and tool; `None`: no friction, and nothing is built for it.
+    pub friction: Option<Coefficients>,
     /// What a step is allowed and asked to do.
     pub settings: EngineSettings,
 }

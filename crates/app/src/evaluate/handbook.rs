@@ -9,7 +9,7 @@ use crate::session::{Record, Recording};
 /// What `[handbook]` says, if the scene has one. Its formulas are without friction, and so is the curve that they stand
 /// beside, unless they say otherwise. `strain`: the largest principal one.
 pub(super) fn beside(scene: &Scene, ways: &Driven, strain: f64) -> Option<Handbook> {
-    let friction = ways.friction.unwrap_or(0.0);
+    let friction = ways.friction.map_or(0.0, |of| of.kinetic_coefficient);
     let handbook = scene.handbook.as_ref()?;
     let prediction = handbook.predict(&scene.part.material, friction);
     let driven = &ways.plain().recording;

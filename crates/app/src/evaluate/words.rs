@@ -1,11 +1,13 @@
 //! Settings, checks, troubles and notes of a run, in words.
 
+use contact::friction::Coefficients;
+
 use super::Story;
 use crate::effects::Verdict;
 use crate::prepare::PreparedCompliance;
 use crate::prepare::budget::bytes;
-use crate::report::PartCurve;
 use crate::report::part_curve::Place;
+use crate::report::{PartCurve, coefficient_in_words};
 use crate::scene::{EffectChoice, Guide, ToolShape};
 use crate::session::{Record, Recording};
 
@@ -239,9 +241,12 @@ impl Story<'_> {
             format!(
                 "Contact is {} and quasi-static, displacements are linear; strain is recovered at the skin (superconvergent \
                  patch recovery), rotation is the largest at the integration points.",
-                match self.driven.friction {
+                match &self.driven.friction {
                     None => "frictionless".to_owned(),
-                    Some(mu) => format!("with Coulomb's friction (coefficient {mu}, exact cone)"),
+                    Some(of) => format!(
+                        "with Coulomb's friction (coefficient {}, exact cone)",
+                        coefficient_in_words(of)
+                    ),
                 }
             ),
         ];
@@ -296,7 +301,7 @@ pub(super) fn called_for(verdict: &Verdict, choice: EffectChoice) -> Option<Stri
 /// Friction that is in the curve: what it changed, beside what was expected.
 pub(super) fn friction_in(
     expected: Verdict,
-    coefficient: f64,
+    coefficients: &Coefficients,
     curve: &PartCurve,
     plain: &PartCurve,
 ) -> Verdict {
@@ -317,7 +322,8 @@ pub(super) fn friction_in(
         on: true,
         missing: false,
         why: format!(
-            "simulated with a coefficient of {coefficient}:{}{estimate}",
+            "simulated with a coefficient of {}:{}{estimate}",
+            coefficient_in_words(coefficients),
             parts.join(",")
         ),
         ..expected

@@ -7,7 +7,7 @@ mod drive;
 
 use glam::DVec3;
 
-pub use self::drive::{DriveRow, Driven, FrictionFacts};
+pub use self::drive::{DriveRow, Driven, FrictionFacts, coefficient_in_words};
 use super::origin::Origin;
 use super::strain::StrainFacts;
 use super::summary::Percentiles;

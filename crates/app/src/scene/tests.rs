@@ -237,6 +237,27 @@ fn refusals_name_line_key_and_mend() {
             "clip.toml:22: friction_coefficient is NaN; write a number",
         ),
         (
+            adding("[effects]\nfriction_coefficient = 0.3\nstatic_friction_coefficient = 0.2\n"),
+            "clip.toml:23: static_friction_coefficient 0.2 is below 0.3, the coefficient of sliding; write 0.3 or more, or \
+             leave it out",
+        ),
+        (
+            adding("[effects]\nstatic_friction_coefficient = 0.2\n"),
+            "clip.toml:22: static_friction_coefficient has no friction_coefficient beside it, that of sliding; write \
+             friction_coefficient too, or both materials",
+        ),
+        (
+            adding("[effects]\nfriction_coefficient = 0.2\nslip_weakening_distance = 1e-4\n"),
+            "clip.toml:23: slip_weakening_distance is the way from static_friction_coefficient to friction_coefficient; write \
+             static_friction_coefficient too, or leave it out",
+        ),
+        (
+            adding(
+                "[effects]\nfriction_coefficient = 0.2\nstatic_friction_coefficient = 0.3\nslip_weakening_distance = 0\n",
+            ),
+            "clip.toml:24: slip_weakening_distance 0 must be above 0; write a positive number",
+        ),
+        (
             adding("[effects]\nfriction = \"onn\"\n"),
             "clip.toml:22: friction has no choice `onn`; the nearest is `on`",
         ),

@@ -78,10 +78,7 @@ pub fn run(
     tool: &Tool,
     progress: &dyn fem::Progress,
 ) -> Result<EffectStudy, Error> {
-    let has_friction = scene
-        .effects
-        .friction_coefficient
-        .is_some_and(|mu| mu > 0.0);
+    let has_friction = scene.effects.friction_coefficients().is_some();
     let forced = scene.with_friction(has_friction);
     let (engine, driven) = drive::of_scene(&forced, prepared, tool.clone(), progress)?;
     let plain = driven.plain();
@@ -125,10 +122,7 @@ fn change(off: Option<Place>, on: Option<Place>) -> Option<Change> {
 fn row(scene: &Scene, verdict: &Verdict) -> Row {
     let choice = verdict.effect.choice(&scene.effects);
     let is_on = verdict.effect.is_simulated()
-        && scene
-            .effects
-            .friction_coefficient
-            .is_some_and(|mu| mu > 0.0)
+        && scene.effects.friction_coefficients().is_some()
         && (choice == EffectChoice::On || (choice == EffectChoice::Auto && verdict.missing));
     Row {
         effect: verdict.effect.name(),
@@ -183,7 +177,7 @@ fn observed(
         ramp,
         release,
         has_passed,
-        friction_coefficient: scene.effects.friction_coefficient,
+        friction_coefficient: scene.effects.largest_friction(),
         motion_per_feature: per_period / feature,
     })
 }

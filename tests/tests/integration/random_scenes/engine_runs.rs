@@ -10,7 +10,7 @@ use glam::{DQuat, DVec3};
 use glamx::DPose3;
 use snapin::engine::{ContactIterations, Engine, EngineSettings, Plan, StepReport};
 use snapin::prepare::PreparedPart;
-use snapin::scene::{ContactAt, Scene, ToolFeatures};
+use snapin::scene::{ContactAt, Scene, StaticFriction, ToolFeatures};
 use snapin::session::fast::FastSettings;
 use snapin::session::slow::Stepped;
 use snapin::setup;
@@ -206,6 +206,12 @@ fn engine(random: &mut Random, ready: &Ready, tool: &Tool) -> Result<Engine, Str
     let friction = random.chance(0.4).then(|| random.decades(1e-3, 3.0));
     let mut scene = scene.with_friction(friction.is_some());
     scene.effects.friction_coefficient = friction;
+    if let Some(kinetic) = friction.filter(|_| random.chance(0.3)) {
+        scene.effects.static_friction = Some(StaticFriction {
+            coefficient: kinetic * random.decades(1.0, 4.0),
+            weakening_distance: random.decades(1e-7, 1e-2),
+        });
+    }
     let settings = settings(random, tool, ready.size);
     if random.chance(0.5) {
         scene.accuracy.near_distance = Some(settings.near_distance);
@@ -218,7 +224,7 @@ fn engine(random: &mut Random, ready: &Ready, tool: &Tool) -> Result<Engine, Str
     }
     let part = ready.prepared.contact_part();
     let plan = Plan {
-        friction,
+        friction: scene.effects.simulated_friction(),
         ..Plan::new(part, tool.clone(), None, settings)
     };
     let plan = setup::with_contact(&scene, &ready.prepared, plan).map_err(|e| e.to_string())?;

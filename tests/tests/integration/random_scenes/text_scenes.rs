@@ -38,7 +38,13 @@ fn effects_keys(random: &mut Random) -> String {
     }
     let choice = random.pick(&["on", "off", "auto"]);
     let coefficient = random.decades(1e-3, 3.0);
-    format!("[effects]\nfriction = \"{choice}\"\nfriction_coefficient = {coefficient:?}\n\n")
+    let mut keys =
+        format!("[effects]\nfriction = \"{choice}\"\nfriction_coefficient = {coefficient:?}\n");
+    if random.chance(0.3) {
+        let at_rest = coefficient * random.decades(1.0, 4.0);
+        keys += &format!("static_friction_coefficient = {at_rest:?}\n");
+    }
+    keys + "\n"
 }
 
 fn accuracy_keys(random: &mut Random) -> String {

@@ -6,12 +6,13 @@
 //! ```
 //! s: slip of the part's material point over the tool in the tangent plane at the end of the step; u⁰ and X⁰:
 //! displacement and pose of the tool at its start; M carries what was there along with the tool. The whole step counts,
-//! over all its strides and passes, also where a contact closed on the way. Nothing else is remembered: no stick flag, no
-//! anchor. Forces and the tool's virtual coupling are in one problem, as without friction. Sources: Moreau 1988 and Jean
+//! over all its strides and passes, also where a contact closed on the way. Nothing else is remembered, no stick flag and no
+//! anchor, but the way slipped where static friction differs from kinetic ([`Weakening`]). Forces and the tool's virtual coupling are in one problem, as without friction. Sources: Moreau 1988 and Jean
 //! 1999 for the implicit increment, de Saxcé and Feng 1998 for the cone.
 
+use contact::Contact;
 use contact::delassus::{Frame, delassus_frames_into};
-use contact::friction::{Problem, Scratch, Settings, State, Status, solve};
+use contact::friction::{Coefficients, Problem, Scratch, Settings, State, Status, solve};
 use glam::DVec3;
 use glamx::DPose3;
 
@@ -19,6 +20,7 @@ use super::super::StepReport;
 use super::super::forces::{Forces, State as OfForces};
 use super::super::places::Places;
 use super::super::rows::Rows;
+use super::weakening::Weakening;
 use super::{ByContact, Given};
 
 /// Part and tool when the step began.
@@ -42,7 +44,10 @@ pub(in super::super) struct Coulomb {
     q: Vec<f64>,
     force: Vec<f64>,
     motion: Vec<f64>,
+    /// By row.
     coefficients: Vec<f64>,
+    /// Where static friction differs from kinetic.
+    weakening: Option<Weakening>,
     /// By key: force on the part in the last pass, N, where it is among `carrying`.
     kept: Vec<DVec3>,
     carrying: Vec<u32>,
@@ -53,7 +58,7 @@ pub(in super::super) struct Coulomb {
 impl Coulomb {
     /// As [`Rows::new`].
     pub(super) fn new(
-        coefficient: f64,
+        coefficients: Coefficients,
         n_candidates: usize,
         n_keys: usize,
         max_near: usize,
@@ -72,7 +77,9 @@ impl Coulomb {
             q: vec![0.0; n],
             force: vec![0.0; n],
             motion: vec![0.0; n],
-            coefficients: vec![coefficient; max_rows],
+            coefficients: vec![coefficients.kinetic_coefficient; max_rows],
+            weakening: (!coefficients.is_constant())
+                .then(|| Weakening::new(coefficients, n_keys, max_near)),
             kept: vec![DVec3::ZERO; n_keys],
             carrying: Vec::with_capacity(max_near),
             scratch: Scratch::new(max_rows),
@@ -90,12 +97,18 @@ impl Coulomb {
     pub(in super::super) fn begin_step(&mut self, forces: &Forces, tool_pose: DPose3) {
         self.start.forces.copy_from(forces);
         self.start.tool_pose = tool_pose;
+        if let Some(weakening) = &mut self.weakening {
+            weakening.begin_step();
+        }
     }
 
     /// Forgets what passes started from.
     pub(in super::super) fn clear(&mut self) {
         for key in self.carrying.drain(..) {
             self.kept[key as usize] = DVec3::ZERO;
+        }
+        if let Some(weakening) = &mut self.weakening {
+            weakening.begin_pass();
         }
     }
 
@@ -124,6 +137,7 @@ impl Coulomb {
         };
         debug_assert!(assembled.is_ok(), "the matrix has the size of the rows");
         self.write_q(rows);
+        self.write_coefficients(rows, given.places);
     }
 
     /// Tangents of each contact; like ones where contacts share a row.
@@ -188,6 +202,28 @@ impl Coulomb {
                 }),
             };
             q.copy_from_slice(&[rows.q[row], slip[0], slip[1]]);
+        }
+    }
+
+    /// Of the way slipped until the step began; contacts that share a row by their shares of it.
+    fn write_coefficients(&mut self, rows: &Rows, places: &Places) {
+        let Some(weakening) = &self.weakening else {
+            return;
+        };
+        let of =
+            |contact: &Contact| weakening.coefficient(places.list()[contact.place as usize].key);
+        for (row, coefficient) in self.coefficients.iter_mut().take(rows.m).enumerate() {
+            *coefficient = match rows.share.patches() {
+                None => of(&rows.contacts[row]),
+                Some(patches) => {
+                    let shares = patches.range(row).map(|i| {
+                        let (_, share) = patches.share_of(i);
+                        (share * of(&rows.contacts[i]), share)
+                    });
+                    let (sum, all) = shares.fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
+                    sum / all
+                }
+            };
         }
     }
 
@@ -276,6 +312,15 @@ impl Coulomb {
                 let key = places.list()[contact.place as usize].key;
                 self.kept[key as usize] = on_part;
                 self.carrying.push(key);
+                if let Some(weakening) = &mut self.weakening {
+                    let motion = &self.motion[3 * row..3 * row + 3];
+                    let slip = if sticks {
+                        None
+                    } else {
+                        Some(motion[1].hypot(motion[2]))
+                    };
+                    weakening.end_pass(key, along[0], slip);
+                }
                 report.sticking += u32::from(sticks);
             }
         }

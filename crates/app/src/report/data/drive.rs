@@ -1,6 +1,9 @@
 //! The part's own curve: the held body driven along its path, without a hand.
 
+use contact::friction::Coefficients;
+
 use super::super::part_curve::{Doubts, LimitFact, Limits, PartCurve, Verdict, limits};
+use super::super::plot::short;
 use super::super::strain::StrainFacts;
 use super::Phase;
 
@@ -36,7 +39,7 @@ pub struct DriveRow {
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrictionFacts {
     /// Coulomb's.
-    pub coefficient: f64,
+    pub coefficients: Coefficients,
     /// Where it is from, if it was not stated.
     pub source: Option<String>,
     /// The same way without friction.
@@ -45,11 +48,26 @@ pub struct FrictionFacts {
     pub frictionless: PartCurve,
 }
 
+/// A coefficient; that at rest too, where it differs.
+pub fn coefficient_in_words(of: &Coefficients) -> String {
+    let kinetic = short(of.kinetic_coefficient);
+    if of.is_constant() {
+        return kinetic;
+    }
+    let at_rest = short(of.static_coefficient);
+    let way = short(1e3 * of.weakening_distance);
+    format!("{kinetic} ({at_rest} at rest, falling to it over {way} mm of slip)")
+}
+
 impl FrictionFacts {
     /// Of the way without friction.
-    pub fn of(coefficient: f64, source: Option<String>, frictionless_rows: Vec<DriveRow>) -> Self {
+    pub fn of(
+        coefficients: Coefficients,
+        source: Option<String>,
+        frictionless_rows: Vec<DriveRow>,
+    ) -> Self {
         Self {
-            coefficient,
+            coefficients,
             source,
             frictionless: PartCurve::of(&frictionless_rows),
             frictionless_rows,

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::super::data::{Driven, FrictionFacts};
+use super::super::data::{Driven, FrictionFacts, coefficient_in_words};
 use super::super::plot::short;
 use super::{Hump, LimitState, Locking, Outcome, PartCurve, Place, Removal};
 
@@ -82,7 +82,7 @@ fn lines_of_friction(
     let of = |place: Option<Place>| place.map_or_else(|| "0".to_owned(), |p| newtons(p.force_n));
     let mut text = format!(
         "coefficient {}: in {} N for {} without",
-        short(friction.coefficient),
+        coefficient_in_words(&friction.coefficients),
         of(curve.insertion()),
         of(plain.insertion()),
     );
@@ -286,7 +286,7 @@ fn friction(driven: &Driven) -> String {
     });
     format!(
         " Friction with a coefficient of {} is in these numbers; without it pushing in takes {} N{out}.{locks}",
-        short(friction.coefficient),
+        coefficient_in_words(&friction.coefficients),
         of(plain.insertion()),
     )
 }

@@ -88,6 +88,8 @@ pub(super) fn locking(driven: &Driven) -> Option<LockingSummary> {
 )]
 struct FrictionSummary {
     coefficient: f64,
+    static_coefficient: Option<f64>,
+    slip_weakening_distance_m: Option<f64>,
     source: Option<String>,
     frictionless_peak_insertion_force_N: Option<f64>,
     frictionless_peak_removal_force_N: Option<f64>,
@@ -103,10 +105,13 @@ struct FrictionSummary {
 fn friction(driven: &Driven) -> Option<FrictionSummary> {
     let facts = driven.friction.as_ref()?;
     let (curve, plain) = (&driven.curve, &facts.frictionless);
+    let at_rest = Some(facts.coefficients).filter(|of| !of.is_constant());
     let force = |place: Option<Place>| place.map(|place| place.force_n);
     let (into, out) = (force(curve.insertion()), force(curve.removal.peak()));
     Some(FrictionSummary {
-        coefficient: facts.coefficient,
+        coefficient: facts.coefficients.kinetic_coefficient,
+        static_coefficient: at_rest.map(|of| of.static_coefficient),
+        slip_weakening_distance_m: at_rest.map(|of| of.weakening_distance),
         source: facts.source.clone(),
         frictionless_peak_insertion_force_N: force(plain.insertion()),
         frictionless_peak_removal_force_N: force(plain.removal.peak()),

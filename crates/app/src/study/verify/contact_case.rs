@@ -7,6 +7,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use contact::delassus::ComplianceBlocks;
+use contact::friction::Coefficients;
 use contact::lcp;
 use contact::tool::{BoxShape, Capsule, Cylinder, HalfSpace, Sphere, Tool};
 use fem::Compliance;
@@ -206,7 +207,7 @@ pub(super) fn engine_of(
         max_stride: f64::INFINITY,
     };
     let plan = Plan {
-        friction,
+        friction: friction.map(Coefficients::constant),
         ..Plan::new(part.clone(), tool.clone(), None, settings)
     };
     Engine::new(plan).map_err(|e| Failure::Error(e.to_string()))

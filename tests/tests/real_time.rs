@@ -129,7 +129,8 @@ fn no_step_of_an_insertion_allocates() {
 /// The fast loop of two rates, with the engine's work in turns: solving, hand-overs and freezing take no memory.
 fn no_tick_of_two_rates_allocates() {
     let (scene, prepared) = shipped("clip.toml");
-    no_tick_allocates(&scene, &prepared);
+    no_tick_allocates(&scene.with_friction(false), &prepared);
+    no_tick_allocates(&scene.with_friction(true), &prepared);
     let (mut scene, prepared) = shipped("clip.toml");
     scene.accuracy.contact_at = ContactAt::Places;
     no_tick_allocates(&scene, &prepared);

@@ -208,13 +208,6 @@ pub fn run(
     let n_periods = script.periods(spec.period_s);
     let hand = SimulatedHand::new(spec.hand, script, spec.period_s)?;
     let device = Simulated::new(SimulatedSettings::default(), hand)?;
-    if matches!(spec.rates, Rates::Every(_)) && engine.has_friction() {
-        return Err(Error::Input(
-            "accuracy.rates asks for two rates, and the scene for friction, which is solved in whole steps only; write \
-             accuracy.rates = \"one\", or effects.friction = \"off\""
-                .to_owned(),
-        ));
-    }
     shape.follow(spec.real_time);
     let rates = choose(spec, engine);
     if spec.real_time && rates.every.is_none() {

@@ -375,16 +375,6 @@ fn a_pair_of_materials_has_its_coefficient_and_an_unknown_one_is_named() {
 }
 
 #[test]
-fn two_rates_with_friction_are_refused_with_the_mend() {
-    let folder = tempfile::tempdir().unwrap();
-    let more = "friction_coefficient = 0.2\nfriction = \"on\"\n[accuracy]\nrates = { every = 5 }\n\
-                [hand]\nspeed = 0.02\nmass = 0.3\nstiffness = 6000.0\n";
-    let (outcome, _) = run(folder.path(), &format!("[effects]\n{more}"));
-    assert_eq!(outcome.code, 2, "{}", outcome.err);
-    assert!(outcome.err.contains("accuracy.rates"), "{}", outcome.err);
-}
-
-#[test]
 fn effects_tells_what_friction_changes_and_costs() {
     let folder = tempfile::tempdir().unwrap();
     let scene = root().join("scenes/clip.toml");

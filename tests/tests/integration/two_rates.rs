@@ -1,6 +1,8 @@
 //! Two rates: a frozen contact problem against the step it is from and against whole steps elsewhere, and sessions in
 //! which the loop solves frozen problems against those in which it solves whole steps.
 
+mod friction;
+
 use device::Wrench;
 use glam::{DQuat, DVec3};
 use glamx::DPose3;
@@ -152,16 +154,20 @@ fn measured_gaps_lead_to_the_answer_of_a_whole_step() {
     assert!((1.8..2.3).contains(&median), "{ratios:?}");
 }
 
-/// A session of the clip with these rates.
+/// A session of the clip with these rates, without friction.
 fn session_of(rates: Rates) -> Recording {
-    let (mut scene, part) = shipped("clip.toml");
+    let (scene, part) = shipped("clip.toml");
+    session_in(scene.with_friction(false), &part, rates)
+}
+
+fn session_in(mut scene: Scene, part: &PreparedPart, rates: Rates) -> Recording {
     scene.accuracy.rates = rates;
     scene.hand.as_mut().unwrap().hold = 0.02;
-    let mut engine = engine(&scene, &part);
-    let mut shape = Shape::new(&part, &scene.accuracy, None).unwrap();
+    let mut engine = engine(&scene, part);
+    let mut shape = Shape::new(part, &scene.accuracy, None).unwrap();
     session::run(
-        &setup::session(&scene, held(&scene, &part)).unwrap(),
-        &part,
+        &setup::session(&scene, held(&scene, part)).unwrap(),
+        part,
         &mut engine,
         &mut shape,
         &fem::Silent,
@@ -362,8 +368,6 @@ fn steps_that_do_not_fit_the_period_lead_to_two_rates() {
         let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
         (summary["rates"].clone(), outcome.err)
     };
-    // Friction is solved in whole steps.
-    let text = text.replace("friction_coefficient", "friction = \"off\"  # ");
     let fast =
         format!("{text}\n[device]\nservo_period = 1e-5\n").replace("hold = 0.3", "hold = 0.0");
     let (rates, said) = run("fast", &fast, &["--real-time"]);

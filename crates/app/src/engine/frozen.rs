@@ -18,11 +18,13 @@
 //!
 //! which costs m² in all, and leaves out that loaded planes turn as the tool slides over the part: an error of first
 //! order in the way since the step, in force times way over the tool's radius.
+//!
+//! With friction each solve is an increment of its own, from the answer before ([`law::Coulomb`]).
 
 mod freeze;
+mod law;
 
 use bytemuck::cast_slice;
-use contact::lcp;
 use contact::tool::Tool;
 use contact::{Contact, Place, wrench_on_tool};
 use glam::{DMat3, DVec3};
@@ -30,7 +32,9 @@ use glamx::DPose3;
 
 use super::forces::Loads;
 use super::held::Held;
+use super::law::ByContact;
 use super::{ActiveContact, StepReport};
+use law::{Law, Measured};
 
 /// Passes in a tick whose gaps are measured, at most; and the change of the wrench, relative, from which on no further
 /// one is made. Each pass leaves a tenth to a third of the change before it.
@@ -59,27 +63,19 @@ pub struct FrozenProblem {
     positions: Vec<DVec3>,
     /// C between rows, 3x3 column-major inside, block of rows i and j at j m + i; for gaps that are measured.
     blocks: Vec<f64>,
-    /// h by row, of the frozen planes.
-    tool_rows: Vec<[f64; 6]>,
     /// m/N by row: no other candidate moves by more than this for a change of the row's force.
     yields: Vec<f64>,
     q_frozen: Vec<f64>,
-    w_matrix: Vec<f64>,
+    law: Law,
     /// N, by row, on the part, at the step's own target.
     forces_frozen: Vec<DVec3>,
-    q: Vec<f64>,
-    /// N, by row, of the last answer.
-    forces: Vec<f64>,
-    on_part: Vec<DVec3>,
+    /// Of the last answer, by row.
+    forces: ByContact,
     /// (m, rad), of the tool from its target in the last answer.
     deviation: [f64; 6],
     /// On the tool in the last answer.
     wrench: [f64; 6],
-    gaps: Vec<f64>,
     loads: Loads,
-    lcp: lcp::Scratch,
-    settings: lcp::Settings,
-    warm: Vec<bool>,
     last_tool_pose: DPose3,
     // What making it needs.
     candidates: Vec<u32>,
@@ -142,8 +138,9 @@ impl FrozenProblem {
         if self.most_passes > 0 {
             self.solve_renewed(target)
         } else {
-            self.move_gaps(target);
-            self.answer(target, lcp::Start::Kept)
+            let moved = self.held.deviation(&self.target, target);
+            self.law.move_gaps(&self.q_frozen, &moved, &self.forces);
+            self.answer(target)
         }
     }
 
@@ -154,8 +151,8 @@ impl FrozenProblem {
         let mut pass = 0;
         loop {
             pass += 1;
-            self.measure_gaps(target);
-            let mut answer = self.answer(target, lcp::Start::Kept);
+            self.measure_gaps(target, pass == 1);
+            let mut answer = self.answer(target);
             pivots += answer.report.pivots;
             let (change, size) = (0..6)
                 .map(|i| (self.wrench[i] - wrench[i], self.wrench[i]))
@@ -171,17 +168,8 @@ impl FrozenProblem {
         }
     }
 
-    /// q where the planes move with the target.
-    fn move_gaps(&mut self, target: &DPose3) {
-        let moved = self.held.deviation(&self.target, target);
-        let of_rows = self.q_frozen.iter().zip(&self.tool_rows);
-        for (q, (q_frozen, h)) in self.q.iter_mut().zip(of_rows) {
-            *q = q_frozen - dot(h, &moved);
-        }
-    }
-
-    /// Planes and q at the places of the last answer, with the tool as far from this target as from the last.
-    fn measure_gaps(&mut self, target: &DPose3) {
+    /// Planes and gaps at the places of the last answer, with the tool as far from this target as from the last.
+    fn measure_gaps(&mut self, target: &DPose3, is_first: bool) {
         let m = self.contacts.len();
         let pose = self.held.pose(target, &self.deviation);
         self.reference = self.held.reference(target, &self.deviation);
@@ -190,32 +178,29 @@ impl FrozenProblem {
         self.positions.clear();
         self.positions
             .extend(self.places.iter().map(|place| place.rest));
-        self.q[..m].fill(0.0);
-        for j in 0..m {
-            let force = self.forces[j];
-            if force == 0.0 {
-                continue;
-            }
-            // The normal of the last answer: it is renewed below, after all places are known.
-            let on_part = force * self.contacts[j].normal;
-            let columns = blocks[j * m..][..m].iter();
-            let columns = columns.zip(&self.w_matrix[j * m..][..m]);
-            for ((x, q), (block, w)) in self.positions.iter_mut().zip(&mut self.q).zip(columns) {
-                *x += *block * on_part;
-                *q -= w * force;
+        for (j, on_part) in self.forces.on_part[..m].iter().enumerate() {
+            if *on_part != DVec3::ZERO {
+                for (x, block) in self.positions.iter_mut().zip(&blocks[j * m..]) {
+                    *x += *block * *on_part;
+                }
             }
         }
-        let of_rows = self.places.iter().zip(&self.positions).zip(&mut self.q);
-        for (k, ((place, x), q)) in of_rows.enumerate() {
+        if is_first {
+            self.law.begin_tick(&self.positions, &self.last_tool_pose);
+        }
+        for (k, (place, x)) in self.places.iter().zip(&self.positions).enumerate() {
             // What is not finite shows in the certificate.
-            let contact = place.contact(k as u32, &self.tool, &pose, *x);
-            *q += contact.gap;
-            self.contacts[k] = contact;
+            self.contacts[k] = place.contact(k as u32, &self.tool, &pose, *x);
         }
+        let measured = Measured {
+            contacts: &self.contacts,
+            positions: &self.positions,
+            tool_pose: &pose,
+        };
+        self.law.measure_gaps(&measured, &self.forces);
     }
 
-    fn answer(&mut self, target: &DPose3, start: lcp::Start<'_>) -> Prediction {
-        let m = self.contacts.len();
+    fn answer(&mut self, target: &DPose3) -> Prediction {
         let mut report = StepReport {
             stage_ns: Default::default(),
             passes: 1,
@@ -223,49 +208,29 @@ impl FrozenProblem {
             pivots: 0,
             certificate: 0.0,
             lcp_solved: true,
-            near: m as u32,
+            near: self.contacts.len() as u32,
             ..self.step
         };
-        let (q, forces) = (&self.q[..m], &mut self.forces[..m]);
-        if q.iter().all(|q| *q >= 0.0) {
-            forces.fill(0.0);
-        } else {
-            let solution =
-                lcp::Problem::trusted_symmetric(&self.w_matrix[..m * m], q).and_then(|problem| {
-                    lcp::solve(
-                        &problem,
-                        &self.settings,
-                        &mut self.lcp,
-                        start,
-                        forces,
-                        &mut self.gaps[..m],
-                    )
-                });
-            match solution {
-                Ok(solution) => {
-                    report.pivots = (solution.rounds + solution.pivots) as u32;
-                    report.certificate = solution.certificate.natural_residual;
-                    report.lcp_solved = solution.status == lcp::Status::Solved;
-                }
-                // Only data that are not finite: no force, and the report says so.
-                Err(_) => {
-                    forces.fill(0.0);
-                    (report.certificate, report.lcp_solved) = (f64::INFINITY, false);
-                }
-            }
-        }
+        self.law
+            .solve(&self.contacts, &mut self.forces, &mut report);
+        self.conclude(target, report)
+    }
+
+    /// What the forces do.
+    fn conclude(&mut self, target: &DPose3, mut report: StepReport) -> Prediction {
+        let m = self.contacts.len();
         self.loads.clear();
         report.contacts = 0;
-        self.on_part.clear();
-        for ((contact, place), &force) in self.contacts.iter().zip(&self.places).zip(&*forces) {
-            let on_part = force * contact.normal;
-            self.on_part.push(on_part);
+        for (row, place) in self.places.iter().enumerate() {
+            let force = self.forces.normal[row];
             if force > 0.0 {
                 report.contacts += 1;
-                self.loads.add(place, force, on_part, false);
+                let (on_part, sticks) = (self.forces.on_part[row], self.forces.sticks[row]);
+                self.loads.add(place, force, on_part, sticks);
             }
         }
-        let (force, torque) = wrench_on_tool(&self.contacts, &self.on_part, self.reference);
+        let on_part = &self.forces.on_part[..m];
+        let (force, torque) = wrench_on_tool(&self.contacts, on_part, self.reference);
         let wrench = [force.x, force.y, force.z, torque.x, torque.y, torque.z];
         self.deviation = self.held.deviation_under(&wrench);
         self.wrench = wrench;
@@ -274,12 +239,9 @@ impl FrozenProblem {
         report.coupling_wrench_on_tool =
             self.held.wrench_on_tool(target, &report.tool_pose, &wrench);
         self.last_tool_pose = report.tool_pose;
-        let of_rows = self.contacts.iter().zip(&self.forces[..m]);
+        let of_rows = on_part.iter().zip(&self.forces_frozen).zip(&self.yields);
         let by_part: f64 = of_rows
-            .zip(self.forces_frozen.iter().zip(&self.yields))
-            .map(|((contact, force), (then, yields))| {
-                yields * (*force * contact.normal - *then).length()
-            })
+            .map(|((force, then), yields)| yields * (*force - *then).length())
             .sum();
         let (from, to) = (&self.step.tool_pose, &report.tool_pose);
         let by_tool = (to.translation - from.translation).length()
@@ -289,8 +251,4 @@ impl FrozenProblem {
             is_within: by_tool + by_part <= self.margin,
         }
     }
-}
-
-fn dot(a: &[f64; 6], b: &[f64; 6]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

@@ -28,7 +28,7 @@ pub(super) struct ByContact {
 }
 
 impl ByContact {
-    fn new(max_near: usize) -> Self {
+    pub(super) fn new(max_near: usize) -> Self {
         Self {
             normal: vec![0.0; max_near],
             on_part: vec![DVec3::ZERO; max_near],
@@ -36,7 +36,7 @@ impl ByContact {
         }
     }
 
-    fn clear(&mut self, n_contacts: usize) {
+    pub(super) fn clear(&mut self, n_contacts: usize) {
         self.normal[..n_contacts].fill(0.0);
         self.on_part[..n_contacts].fill(DVec3::ZERO);
     }

@@ -98,10 +98,6 @@ pub(super) fn choose(spec: &SessionSpec, engine: &mut Engine) -> ChosenRates {
     let (every, why) = match spec.rates {
         Rates::One => (None, "asked for".to_owned()),
         Rates::Every(n) => (Some(u64::from(n)), "asked for".to_owned()),
-        Rates::Auto if engine.has_friction() => (
-            None,
-            "friction is solved in whole steps, not in frozen problems".to_owned(),
-        ),
         Rates::Auto if !spec.real_time => (None, "no real clock to keep up with".to_owned()),
         Rates::Auto => rehearse(spec, engine),
     };

@@ -1,14 +1,17 @@
 //! From a step to its frozen problem: rows, gaps, operator and its factor.
 
-use contact::delassus::{ComplianceBlocks, delassus_into};
-use contact::{Contact, lcp};
+use contact::Contact;
+use contact::delassus::ComplianceBlocks;
 use glam::DVec3;
 use glamx::DPose3;
 
 use super::super::forces::Loads;
+use super::super::law::{self, ByContact};
 use super::super::near::Look;
+use super::super::rows::Bodies;
 use super::super::{Engine, StepReport};
-use super::{FrozenProblem, MOST_PASSES, dot};
+use super::law::Law;
+use super::{FrozenProblem, MOST_PASSES};
 
 /// Rows of places that are not near yet: half as many as there are near ones, so that W costs twice that of a pass at
 /// most, and no fewer than this.
@@ -36,21 +39,14 @@ impl Engine {
             places: Vec::with_capacity(rows),
             positions: Vec::with_capacity(rows),
             blocks: vec![0.0; 9 * rows * rows],
-            tool_rows: Vec::with_capacity(rows),
             yields: Vec::with_capacity(rows),
             q_frozen: Vec::with_capacity(rows),
-            w_matrix: vec![0.0; rows * rows],
+            law: Law::of(self),
             forces_frozen: vec![DVec3::ZERO; rows],
-            q: vec![0.0; rows],
-            forces: vec![0.0; rows],
-            on_part: Vec::with_capacity(rows),
+            forces: ByContact::new(rows),
             deviation: [0.0; 6],
             wrench: [0.0; 6],
-            gaps: vec![0.0; rows],
             loads: Loads::new(n),
-            lcp: lcp::Scratch::new(rows),
-            settings: self.settings.lcp.clone(),
-            warm: vec![false; rows],
             last_tool_pose: identity,
             candidates: Vec::with_capacity(n),
             extra: Vec::with_capacity(self.places.capacity()),
@@ -66,23 +62,40 @@ impl Engine {
         let Some(target) = self.last_target else {
             return;
         };
+        if let Some(coulomb) = self.law.coulomb_mut() {
+            coulomb.end_step();
+        }
         problem.step = *report;
         problem.target = target;
         problem.reference = self.reference;
         self.choose_rows(report, reach, problem);
         self.fill_rows(problem);
         let m = problem.contacts.len();
-        let (q, q_frozen) = (&mut problem.q, &problem.q_frozen);
-        q[..m].copy_from_slice(q_frozen);
-        let warm = std::mem::take(&mut problem.warm);
-        problem.answer(&target, lcp::Start::Rows(&warm[..m]));
-        problem.warm = warm;
-        let of_rows = problem.contacts.iter().zip(&problem.forces);
-        for (frozen, (contact, force)) in problem.forces_frozen.iter_mut().zip(of_rows) {
-            *frozen = *force * contact.normal;
-        }
+        self.answer_as_the_step(&target, problem);
+        problem.forces_frozen[..m].copy_from_slice(&problem.forces.on_part[..m]);
         let per_pass = (m * (report.contacts as usize).max(m / 8)).max(1);
         problem.most_passes = ((MOST_BLOCKS / per_pass) as u32).min(MOST_PASSES);
+    }
+
+    /// Forces at the step's own target: those of the step where friction holds them, else solved for, which leaves a factor.
+    fn answer_as_the_step(&self, target: &DPose3, problem: &mut FrozenProblem) {
+        if let (law::Law::Coulomb(coulomb), Law::Coulomb(frozen)) = (&self.law, &mut problem.law) {
+            frozen.coefficients.clear();
+            for (row, (contact, place)) in problem.contacts.iter().zip(&problem.places).enumerate()
+            {
+                let on_part = coulomb.last_force(place.key);
+                problem.forces.normal[row] = contact.normal.dot(on_part);
+                problem.forces.on_part[row] = on_part;
+                problem.forces.sticks[row] = false;
+                frozen.coefficients.push(coulomb.coefficient(place.key));
+            }
+            problem.conclude(target, problem.step);
+        } else {
+            problem
+                .law
+                .move_gaps(&problem.q_frozen, &[0.0; 6], &problem.forces);
+            problem.answer(target);
+        }
     }
 
     /// The contacts of the last pass, and of the places within reach besides, the nearest first, by the engine's places.
@@ -157,11 +170,9 @@ impl Engine {
             contacts,
             places,
             blocks,
-            tool_rows,
             yields,
             q_frozen,
-            w_matrix,
-            warm,
+            law,
             ..
         } = problem;
         // Where contacts share rows, q is that of the patches.
@@ -172,8 +183,6 @@ impl Engine {
         let list = self.places.list();
         places.clear();
         places.extend(contacts.iter().map(|contact| list[contact.place as usize]));
-        tool_rows.clear();
-        tool_rows.extend(contacts.iter().map(|contact| contact.tool_row(reference)));
         yields.clear();
         yields.extend(places.iter().map(|place| {
             let shares = place.shares().iter();
@@ -182,19 +191,27 @@ impl Engine {
         }));
         q_frozen.clear();
         q_frozen.extend_from_slice(&self.rows.q[..m_of_pass]);
-        for (contact, h) in contacts.iter().zip(&*tool_rows).skip(m_of_pass) {
+        let bodies = Bodies {
+            part,
+            held: &self.held,
+            reference,
+            deviation: &self.deviation,
+        };
+        for contact in &contacts[m_of_pass..] {
             let u = self.places.displacement_when_drawn(contact.place as usize);
-            q_frozen.push(contact.gap - contact.normal.dot(u) + dot(h, &self.deviation));
+            let of_tool = bodies.along(contact, contact.normal);
+            q_frozen.push(contact.gap - contact.normal.dot(u) + of_tool);
         }
-        for (warm, place) in warm.iter_mut().zip(&*places) {
-            *warm = self.forces.is_carried(place.key);
+        if let Law::Frictionless(law) = law {
+            law.warm.clear();
+            law.warm
+                .extend(places.iter().map(|place| self.forces.is_carried(place.key)));
         }
         self.places.fetch(&mut self.forces.pairs, part);
         let compliance = self.places.compliance(&self.forces.pairs, part);
         let coupling = self.held.compliance_about(reference);
         let m = contacts.len();
-        let assembled = delassus_into(&compliance, contacts, coupling, &mut w_matrix[..m * m]);
-        debug_assert!(assembled.is_ok(), "the matrix has the size of the rows");
+        law.assemble(&compliance, contacts, coupling, reference);
         for (j, of_column) in contacts.iter().enumerate() {
             let column = &mut blocks[9 * j * m..][..9 * m];
             for (out, of_row) in column.chunks_exact_mut(9).zip(&*contacts) {

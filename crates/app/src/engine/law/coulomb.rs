@@ -46,7 +46,9 @@ pub(in super::super) struct Coulomb {
     motion: Vec<f64>,
     /// By row.
     coefficients: Vec<f64>,
-    /// Where static friction differs from kinetic.
+    /// That of sliding.
+    kinetic: f64,
+    /// Where static friction differs from it.
     weakening: Option<Weakening>,
     /// By key: force on the part in the last pass, N, where it is among `carrying`.
     kept: Vec<DVec3>,
@@ -78,6 +80,7 @@ impl Coulomb {
             force: vec![0.0; n],
             motion: vec![0.0; n],
             coefficients: vec![coefficients.kinetic_coefficient; max_rows],
+            kinetic: coefficients.kinetic_coefficient,
             weakening: (!coefficients.is_constant())
                 .then(|| Weakening::new(coefficients, n_keys, max_near)),
             kept: vec![DVec3::ZERO; n_keys],
@@ -97,8 +100,13 @@ impl Coulomb {
     pub(in super::super) fn begin_step(&mut self, forces: &Forces, tool_pose: DPose3) {
         self.start.forces.copy_from(forces);
         self.start.tool_pose = tool_pose;
+        self.end_step();
+    }
+
+    /// What slipped in the step that is over counts from here on; asked twice it does nothing.
+    pub(in super::super) fn end_step(&mut self) {
         if let Some(weakening) = &mut self.weakening {
-            weakening.begin_step();
+            weakening.end_step();
         }
     }
 
@@ -110,6 +118,17 @@ impl Coulomb {
         if let Some(weakening) = &mut self.weakening {
             weakening.begin_pass();
         }
+    }
+
+    /// On the part in the last pass, N.
+    pub(in super::super) fn last_force(&self, key: u32) -> DVec3 {
+        self.kept[key as usize]
+    }
+
+    /// Of a contact now.
+    pub(in super::super) fn coefficient(&self, key: u32) -> f64 {
+        let weakening = self.weakening.as_ref();
+        weakening.map_or(self.kinetic, |weakening| weakening.coefficient(key))
     }
 
     pub(super) fn rest(&mut self, n_contacts: usize, report: &mut StepReport) {

@@ -11,7 +11,7 @@ use contact::friction::Coefficients;
 #[derive(Debug)]
 pub(super) struct Weakening {
     coefficients: Coefficients,
-    /// By key: slipped since it last stuck until the step began, m; NaN where there was no contact.
+    /// By key: slipped since it last stuck until the last step ended, m; NaN where there was no contact.
     slipped: Vec<f64>,
     known: Vec<u32>,
     /// m, of the known ones, weighted with their forces.
@@ -42,7 +42,7 @@ impl Weakening {
     }
 
     /// What the last pass left is what has slipped. Twice is as once.
-    pub(super) fn begin_step(&mut self) {
+    pub(super) fn end_step(&mut self) {
         for key in self.known.drain(..) {
             self.slipped[key as usize] = f64::NAN;
         }
@@ -76,7 +76,7 @@ impl Weakening {
         self.coefficients.after(self.before(key))
     }
 
-    /// m, slipped until the step began.
+    /// m, slipped until the last step ended.
     fn before(&self, key: u32) -> f64 {
         let slipped = self.slipped[key as usize];
         if slipped.is_nan() { self.mean } else { slipped }
@@ -99,12 +99,12 @@ mod tests {
             3,
         );
         let step = |weakening: &mut Weakening, contacts: &[(u32, f64, Option<f64>)]| {
-            weakening.begin_step();
+            weakening.end_step();
             weakening.begin_pass();
             for &(key, force, slip) in contacts {
                 weakening.end_pass(key, force, slip);
             }
-            weakening.begin_step();
+            weakening.end_step();
         };
         assert_eq!(weakening.coefficient(0), 0.5);
         step(&mut weakening, &[(0, 1.0, Some(4e-5)), (1, 3.0, None)]);

@@ -81,14 +81,19 @@ impl Story<'_> {
             pair(
                 "material",
                 format!(
-                    "{}E {}, Poisson's ratio {}",
+                    "{}E {}, Poisson's ratio {}{}",
                     material
                         .name
                         .as_ref()
                         .map(|n| format!("{n}, "))
                         .unwrap_or_default(),
                     scene.pressure_words(material.young_modulus),
-                    material.poisson_ratio
+                    material.poisson_ratio,
+                    material
+                        .source
+                        .as_ref()
+                        .map(|source| format!(" ({source})"))
+                        .unwrap_or_default(),
                 ),
             ),
             pair(

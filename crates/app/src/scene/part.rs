@@ -1,4 +1,4 @@
-//! `[part]`: the deformable part, its mesh, orders, groups and material.
+//! `[part]`: the deformable part, its mesh, orders and groups.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -10,8 +10,8 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::SceneError;
 use super::check::Check;
-use super::check::Range::{Any, Positive};
-use super::keys::{At, Density, Listed, OneOrMore, Plain, Pressure, Whole};
+use super::keys::{At, Listed, OneOrMore, Whole};
+use super::material::{Material, WordOrKeys};
 
 /// The deformable part.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,21 +54,6 @@ pub struct Fixed {
     pub components: [bool; 3],
 }
 
-/// Material of the part.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Material {
-    /// For reports.
-    pub name: Option<String>,
-    /// Pa, > 0.
-    pub young_modulus: f64,
-    /// In (-1, 0.5).
-    pub poisson_ratio: f64,
-    /// kg/m³, > 0.
-    pub density: Option<f64>,
-    /// Largest strain that the material bears once, > 0 (0.02 is 2 %).
-    pub permissible_strain: Option<f64>,
-}
-
 /// Rule for the element integrals.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -100,8 +85,9 @@ pub(super) struct PartKeys {
     #[serde(default)]
     #[schemars(extend("x-default" = "none"))]
     other_meshes: Vec<String>,
-    /// Material of the part; may be its own section `[part.material]`.
-    material: MaterialKeys,
+    /// Material of the part: one word, such as `material = "POM"`, or keys; may be its own section `[part.material]`. What is
+    /// not written is that of the named material, where it is one of the table below.
+    material: At<WordOrKeys>,
     /// What is held: the name of a physical group of the mesh (of volumes, surfaces, curves or points), or a list of
     /// names and of tables with `group` and `components`, such as `{ group = "symmetry", components = ["x"] }`.
     fixed: At<OneOrMore<FixedEntry>>,
@@ -110,21 +96,6 @@ pub(super) struct PartKeys {
     /// Rule for the element integrals.
     #[serde(default)]
     quadrature: QuadratureRule,
-}
-
-#[derive(Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(super) struct MaterialKeys {
-    /// Name for reports.
-    name: Option<String>,
-    /// Young's modulus, above 0.
-    young_modulus: Pressure,
-    /// Poisson's ratio, above -1 and below 0.5; for rubber-like parts 0.49 with order = 3 (elements lock nearer to 0.5 and at lower order).
-    poisson_ratio: Plain,
-    /// Density, above 0; needed for the size of gravity and of the part's inertia.
-    density: Option<Density>,
-    /// Largest strain that the material bears once, such as 0.02; the report compares with it.
-    permissible_strain: Option<Plain>,
 }
 
 /// One held group: its name, or a table.
@@ -202,31 +173,6 @@ fn group(
     }
     let line = check.line(offset);
     Ok(GroupName { name, line })
-}
-
-impl MaterialKeys {
-    fn checked(self, check: &Check<'_>) -> Result<Material, SceneError> {
-        let poisson_ratio = check.number("poisson_ratio", self.poisson_ratio, Any)?;
-        let place = self.poisson_ratio.offset;
-        if poisson_ratio >= 0.5 {
-            let what = format!("poisson_ratio {poisson_ratio} must be below 0.5");
-            let mend = "for rubber-like parts use 0.49 with order = 3 (nearer to 0.5, or at order 2, elements lock: \
-                        forces are far too high)";
-            return Err(check.error(place, what, mend));
-        }
-        if poisson_ratio <= -1.0 {
-            let what = format!("poisson_ratio {poisson_ratio} must be above -1");
-            return Err(check.error(place, what, "plastics have 0.3 to 0.45"));
-        }
-        let strain = self.permissible_strain;
-        Ok(Material {
-            name: self.name,
-            young_modulus: check.number("young_modulus", self.young_modulus, Positive)?,
-            poisson_ratio,
-            density: check.optional("density", self.density, Positive)?,
-            permissible_strain: check.optional("permissible_strain", strain, Positive)?,
-        })
-    }
 }
 
 impl FixedEntry {

@@ -7,7 +7,9 @@ use serde::de::{self, Deserialize, Deserializer, Visitor};
 use serde_json::Value;
 
 use super::{SceneKeys, accuracy, units};
-use super::{coupling, device, drive, effects, hand, handbook, holds, limits, output, part, tool};
+use super::{
+    coupling, device, drive, effects, hand, handbook, holds, limits, material, output, part, tool,
+};
 
 /// A short whole scene, as the document shows it.
 const EXAMPLE: &str = r#"title = "Clip on a 20 mm tube"
@@ -112,13 +114,14 @@ pub fn markdown() -> String {
             keys.iter().filter(|key| **key != "material"),
         );
         if *name == "part" {
-            let material = &section["properties"]["material"];
-            let _ = write!(out, "\n## [part.material]\n\n{}\n\n", description(material));
+            let keys = &section["properties"]["material"];
+            let _ = write!(out, "\n## [part.material]\n\n{}\n\n", description(keys));
             table(
                 &mut out,
-                material,
-                field_names::<part::MaterialKeys>().iter(),
+                keys,
+                field_names::<material::MaterialKeys>().iter(),
             );
+            out.push_str(&material::markdown());
         }
     }
     out

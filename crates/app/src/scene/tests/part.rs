@@ -51,6 +51,96 @@ fn unknown_group_names_the_nearest() {
     );
 }
 
+const MATERIAL: &str = "[part.material]\nyoung_modulus = 2.7e9\npoisson_ratio = 0.35\n";
+
+/// One word says the whole material, in any units; what is written beside a name takes precedence.
+#[test]
+fn material_is_a_word_or_keys_with_the_rest_by_name() {
+    let word = with(MATERIAL, "material = \"POM\"\n")
+        .unwrap()
+        .part
+        .material;
+    assert_eq!((word.young_modulus, word.poisson_ratio), (2.85e9, 0.35));
+    assert_eq!(word.permissible_strain, Some(0.06));
+    assert_eq!(word.density, None);
+    assert_eq!(
+        word.source.as_deref(),
+        Some(
+            "E at small strain by the data sheet of Hostaform C 9021, Poisson's ratio and permissible strain by Bayer's snap-fit guide"
+        )
+    );
+    let mm = CLIP.replace(MATERIAL, "material = \" pom \"\n");
+    let mm = read(format!("units = \"mm-N-MPa\"\n{mm}")).unwrap();
+    assert_eq!(mm.part.material.young_modulus, 2.85e9);
+
+    let text = "material = { name = \"PC\", poisson_ratio = 0.38, density = 1200 }\n";
+    let beside = with(MATERIAL, text).unwrap().part.material;
+    assert_eq!((beside.young_modulus, beside.poisson_ratio), (2.4e9, 0.38));
+    assert_eq!(beside.density, Some(1200.0));
+    assert_eq!(
+        beside.source.as_deref(),
+        Some(
+            "E at small strain by the data sheet of Makrolon 2405, permissible strain by Bayer's snap-fit guide"
+        )
+    );
+
+    // All written: nothing of the table, and a name of one's own stays one.
+    let written = "name = \"ABS\"\npermissible_strain = 0.01\nyoung_modulus = 2.7e9";
+    let written = with("young_modulus = 2.7e9", written)
+        .unwrap()
+        .part
+        .material;
+    assert_eq!(written.young_modulus, 2.7e9);
+    assert_eq!(written.permissible_strain, Some(0.01));
+    assert_eq!(written.source, None);
+    let own = "name = \"POM GF25\"\nyoung_modulus = 2.7e9";
+    let own = with("young_modulus = 2.7e9", own).unwrap().part.material;
+    assert_eq!((own.permissible_strain, own.source), (None, None));
+}
+
+/// The word serves the pair's friction too.
+#[test]
+fn material_by_a_word_has_its_friction() {
+    let text = CLIP.replace(MATERIAL, "material = \"POM\"\n");
+    let text = text.replace("radius = 0.01", "radius = 0.01\nmaterial = \"steel\"");
+    let effects = read(text).unwrap().effects;
+    assert!((effects.friction_coefficient.unwrap() - 0.275).abs() < 1e-12);
+}
+
+#[test]
+fn refusals_of_a_material_name_line_key_and_mend() {
+    let material = |text: &str| with(MATERIAL, text);
+    refuses([
+        (
+            material("material = \"PON\"\n"),
+            "clip.toml:8: key `young_modulus` is missing and \"PON\" is in no table of materials; the nearest is `POM`; or \
+             add `young_modulus = ...` in [part.material]",
+        ),
+        (
+            material("material = \"PA66\"\n"),
+            "clip.toml:8: PA66 is known for its friction (as PA), but its young_modulus is in no table; add \
+             `young_modulus = ...` in [part.material]; without fibres and fillers POM, PC, ABS have it",
+        ),
+        (
+            material("[part.material]\nyoung_modulus = 9e9\nname = \"POM GF25\"\n"),
+            "clip.toml:10: POM GF25 is known for its friction (as POM), but its poisson_ratio is in no table; add \
+             `poisson_ratio = ...`",
+        ),
+        (
+            material("material = 3\n"),
+            "clip.toml:8: material: invalid type: integer `3`, expected the name of a plastic or a section [part.material]",
+        ),
+        (
+            material("material = { nam = \"POM\" }\n"),
+            "clip.toml:8: unknown key `nam`; the nearest is `name`",
+        ),
+        (
+            material(""),
+            "clip.toml:3: key `material` is missing in [part]; add `material = ...`",
+        ),
+    ]);
+}
+
 #[test]
 fn refusals_name_line_key_and_mend() {
     let nu = "poisson_ratio = 0.35";
@@ -81,7 +171,7 @@ fn refusals_name_line_key_and_mend() {
         ),
         (
             with(nu, ""),
-            "clip.toml:8: key `poisson_ratio` is missing in [part.material]; add `poisson_ratio = ...`",
+            "clip.toml:8: key `poisson_ratio` is missing in [part.material]; add `poisson_ratio = ...`, or name one of POM, PC, ABS",
         ),
         (
             with("mesh = \"clip.msh\"", ""),

@@ -109,9 +109,21 @@ pub struct Observed {
     pub release: Option<Ramp>,
     /// Coefficient of friction, if the scene states one.
     pub friction_coefficient: Option<f64>,
-    /// Largest motion of the tool in one servo period over the tool's size or the part's finest
+    /// Motion of the tool in one servo period over the tool's size or the part's finest
     /// feature, whichever is smaller.
-    pub motion_per_feature: f64,
+    pub motion_per_feature: Motion,
+}
+
+/// How far a hand moves the tool in one servo period, over a length.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Motion {
+    /// There is no hand.
+    #[default]
+    None,
+    /// At most, in its run.
+    Seen(f64),
+    /// By its speed; it was not run.
+    BySpeed(f64),
 }
 
 /// Verdict on one effect.

@@ -13,7 +13,7 @@ use crate::Error;
 use crate::between::BetweenNodes;
 use crate::choice::Why;
 use crate::drive::{Driven, Seen};
-use crate::effects::{self, Observed, Verdict, judge};
+use crate::effects::{self, Motion, Observed, Verdict, judge};
 use crate::elsewhere::Elsewhere;
 use crate::engine::{Engine, Stage};
 use crate::fields::FieldSolver;
@@ -328,16 +328,15 @@ impl Story<'_> {
     }
 
     fn observed(&self, max_rotation: f64) -> Observed {
-        // Nothing runs through anything where the steps are those of the way itself.
-        let felt = self.felt.map_or(&[][..], |felt| &felt.recording.records);
-        let fastest = felt
-            .windows(2)
-            .map(|w| {
-                (w[1].report.tool_pose.translation - w[0].report.tool_pose.translation).length()
-            })
-            .fold(0.0, f64::max);
         let feature = drawing::shortest_edge(&self.prepared.loaded.mesh)
             .min(self.engine.tool().characteristic_size());
+        // Nothing runs through anything where the steps are those of the way itself.
+        let motion = self.felt.map_or(Motion::None, |felt| {
+            let place = |record: &Record| record.report.tool_pose.translation;
+            let records = felt.recording.records.windows(2);
+            let steps = records.map(|w| (place(&w[1]) - place(&w[0])).length());
+            Motion::Seen(steps.fold(0.0, f64::max) / feature)
+        });
         let Seen {
             ramp,
             release,
@@ -349,7 +348,7 @@ impl Story<'_> {
             release,
             has_passed,
             friction_coefficient: self.scene.effects.largest_friction(),
-            motion_per_feature: fastest / feature,
+            motion_per_feature: motion,
         }
     }
 }

@@ -7,7 +7,7 @@ use contact::tool::Tool;
 use serde::Serialize;
 
 use crate::drive::{self, Driven, Seen};
-use crate::effects::{Effect, Observed, Verdict};
+use crate::effects::{Effect, Motion, Observed, Verdict};
 use crate::engine::Engine;
 use crate::fields::FieldSolver;
 use crate::prepare::PreparedPart;
@@ -168,17 +168,16 @@ fn observed(
     } = Seen::of(plain);
     let feature =
         crate::evaluate::shortest_edge(&prepared.loaded.mesh).min(tool.characteristic_size());
-    let per_period = scene
-        .hand
-        .as_ref()
-        .map_or(0.0, |hand| hand.speed * scene.device.servo_period);
+    let motion_per_feature = scene.hand.as_ref().map_or(Motion::None, |hand| {
+        Motion::BySpeed(hand.speed * scene.device.servo_period / feature)
+    });
     Ok(Observed {
         max_rotation,
         ramp,
         release,
         has_passed,
         friction_coefficient: scene.effects.largest_friction(),
-        motion_per_feature: per_period / feature,
+        motion_per_feature,
     })
 }
 

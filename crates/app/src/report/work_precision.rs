@@ -37,8 +37,8 @@ pub struct Scale {
     pub bar: Option<f64>,
 }
 
-/// Colours of the lines; a twelfth line begins again.
-const COLOURS: [RGBColor; 11] = [
+/// Colours of the lines; a fourteenth line begins again.
+const COLOURS: [RGBColor; 13] = [
     BLUE,
     VERMILLION,
     GREEN,
@@ -50,6 +50,8 @@ const COLOURS: [RGBColor; 11] = [
     RGBColor(130, 130, 130),
     RGBColor(0, 95, 75),
     RGBColor(120, 40, 40),
+    RGBColor(110, 80, 190),
+    RGBColor(140, 140, 20),
 ];
 
 /// Forces that people tell apart differ by 7 to 10 %; 5 % is the aim.

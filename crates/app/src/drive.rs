@@ -19,7 +19,7 @@ use crate::engine::{Engine, StepReport};
 use crate::follow::Follower;
 use crate::prepare::{Demand, PreparedCompliance, PreparedPart};
 use crate::report::{self, DriveRow};
-use crate::scene::Scene;
+use crate::scene::{EffectChoice, Scene};
 use crate::session::rates::ChosenRates;
 use crate::session::{Entry, Held, Record, Recording, part_extent, refuse_overlap};
 use crate::{Error, interrupt, setup};
@@ -135,6 +135,37 @@ pub fn of_scene(
         ..driven
     };
     Ok((engine, driven))
+}
+
+/// Whether a scene is driven with friction, where it says so itself; `None` where its way without friction decides.
+pub(crate) fn states_friction(scene: &Scene) -> Option<bool> {
+    if scene.effects.simulated_friction().is_some() {
+        return Some(true);
+    }
+    let is_off = scene.effects.friction == EffectChoice::Off;
+    let has_none = scene
+        .with_friction(true)
+        .effects
+        .simulated_friction()
+        .is_none();
+    (is_off || has_none).then_some(false)
+}
+
+/// Whether [`of_scene`] drives a scene with friction in the end.
+///
+/// # Errors
+/// As [`of_scene`].
+pub(crate) fn calls_for_friction(
+    scene: &Scene,
+    prepared: &PreparedPart,
+    tool: Tool,
+    progress: &dyn fem::Progress,
+) -> Result<bool, Error> {
+    if let Some(stated) = states_friction(scene) {
+        return Ok(stated);
+    }
+    let (_, frictionless) = of_resolved(&scene.with_friction(false), prepared, tool, progress)?;
+    Ok(friction::is_called_for(&scene.effects, &frictionless))
 }
 
 /// As [`of_scene`] with friction on or off and not left open.

@@ -2,16 +2,28 @@
 //! refuses. Only cheap choices are run; nothing here looks at a time.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 use snapin_tests::{Outcome, arg, root, snapin};
 
-fn accuracy(out: &Path, more: &[&str]) -> Outcome {
-    let scene = root().join("scenes/clip.toml");
+/// The clip with this in its `[effects]`, its meshes beside it.
+fn clip(folder: &Path, effects: &str) -> PathBuf {
+    let scenes = root().join("scenes");
+    let mut text = fs::read_to_string(scenes.join("clip.toml")).unwrap();
+    for mesh in ["clip.msh", "clip-medium.msh", "clip-fine.msh"] {
+        let path = format!("{:?}", scenes.join(mesh).display().to_string());
+        text = text.replace(&format!("{mesh:?}"), &path);
+    }
+    let scene = folder.join("clip.toml");
+    fs::write(&scene, format!("{text}\n{effects}\n")).unwrap();
+    scene
+}
+
+fn accuracy(scene: &Path, out: &Path, more: &[&str]) -> Outcome {
     let mut args = vec![
         "accuracy",
-        arg(&scene),
+        arg(scene),
         "--out",
         arg(out),
         "--quick",
@@ -30,9 +42,14 @@ fn the_study_of_passes_is_whole_resumes_and_refuses_what_is_not_its_own() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("study");
     let file = dir.path().join("reference.json");
+    let scene = clip(dir.path(), "friction = \"off\"");
 
     // A reference of the scene's own mesh keeps the test short: made by a first, tiny study.
-    let first = accuracy(&out, &["--axes", "scalar", "--save-reference", arg(&file)]);
+    let first = accuracy(
+        &scene,
+        &out,
+        &["--axes", "scalar", "--save-reference", arg(&file)],
+    );
     assert_eq!(first.code, 0, "{}", first.err);
     let study = json(&out);
     let bar = study["reference"]["bar"].as_f64().unwrap();
@@ -74,7 +91,11 @@ fn the_study_of_passes_is_whole_resumes_and_refuses_what_is_not_its_own() {
         ),
     }
 
-    let passes = accuracy(&out, &["--axes", "planes", "--reference", arg(&file)]);
+    let passes = accuracy(
+        &scene,
+        &out,
+        &["--axes", "planes", "--reference", arg(&file)],
+    );
     assert_eq!(passes.code, 0, "{}", passes.err);
     assert!(
         passes.err.contains("were finished before"),
@@ -123,9 +144,133 @@ fn the_study_of_passes_is_whole_resumes_and_refuses_what_is_not_its_own() {
         refused.err
     );
     fs::write(&file, "{}").unwrap();
-    let refused = accuracy(&out, &["--reference", arg(&file)]);
+    let refused = accuracy(&scene, &out, &["--reference", arg(&file)]);
     assert_eq!(refused.code, 2);
     assert!(refused.err.contains("is no reference"), "{}", refused.err);
+}
+
+/// The clip without a hand, in steps of 0.02 mm, up to where it has snapped.
+fn short_clip(folder: &Path, effects: &str) -> PathBuf {
+    let scene = clip(folder, "");
+    let text = fs::read_to_string(&scene).unwrap();
+    let hand = text.find("[hand]").unwrap();
+    let text = text[..hand].replace("travel = 0.014", "travel = 0.007\nstep = 2e-5");
+    fs::write(&scene, format!("{text}\n[effects]\n{effects}\n")).unwrap();
+    scene
+}
+
+/// Implicit increments are of first order: half the increment, half the error. Against a sixteenth of the scene's own, errors
+/// of a quarter to four times it are as 3 : 7 : 15 : 31 : 63, so each is 2.0 to 2.3 times the one before; contacts that land
+/// between two steps scatter that, and none of it is there without friction.
+#[test]
+fn the_study_with_friction_has_it_in_the_reference_too_and_increments_are_of_first_order() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("study");
+    let scene = short_clip(dir.path(), "friction_coefficient = 0.2");
+    let outcome = accuracy(&scene, &out, &["--axes", "increments,rates"]);
+    assert_eq!(outcome.code, 0, "{}", outcome.err);
+    let study = json(&out);
+    // "auto" is decided as in a run. Without friction the reference snaps at 7.9 N.
+    assert_eq!(study["law"]["has_friction"], true);
+    assert!(
+        outcome
+            .out
+            .contains("Coulomb's friction with a coefficient of 0.2")
+    );
+    let number = |value: &Value| value.as_f64().unwrap_or(f64::NAN);
+    let peak = number(&study["reference"]["peak_force_N"]);
+    assert!((12.5..14.0).contains(&peak), "{peak} N");
+    assert!(number(&study["reference"]["bar"]) < 0.2);
+
+    let all = rows(&study);
+    assert_eq!(all.len(), 5, "two rates are no choice with friction");
+    assert!(
+        outcome
+            .out
+            .contains("no choice, friction is solved in whole steps")
+    );
+    let increments: Vec<f64> = all.iter().map(|row| number(&row["increment_m"])).collect();
+    for (found, expected) in increments.iter().zip([5e-6, 1e-5, 2e-5, 4e-5, 8e-5]) {
+        assert!((found / expected - 1.0).abs() < 1e-12, "{increments:?}");
+    }
+    assert_eq!(all[2]["own"], true);
+    let of =
+        |key: &str| -> Vec<f64> { all.iter().map(|row| number(&row["errors"][key])).collect() };
+    let errors = of("solver_l2");
+    for pair in errors.windows(2) {
+        let ratio = pair[1] / pair[0];
+        assert!((1.4..3.0).contains(&ratio), "{ratio} of {errors:?}");
+    }
+    let over_all = errors[4] / errors[0];
+    assert!((10.0..30.0).contains(&over_all), "{errors:?}");
+    assert!(errors[2] < 1e-3, "{errors:?}");
+    // The mesh's error is the same in all of them, and what is compared beside forces is the work put in.
+    let wrench = of("wrench_l2");
+    assert!(
+        wrench.iter().all(|e| (e / wrench[2] - 1.0).abs() < 5e-3),
+        "{wrench:?}"
+    );
+    assert!(
+        of("work").iter().all(|e| (0.01..0.15).contains(e)),
+        "{:?}",
+        of("work")
+    );
+    assert_eq!(all[2]["errors"]["energy"], Value::Null);
+    let page = fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(page.contains("friction with a coefficient of 0.2"));
+    assert!(page.contains("<th>work</th>") && !page.contains("<th>energy</th>"));
+
+    // A reference with friction is none of the scene without it.
+    let file = dir.path().join("reference.json");
+    let axes = ["--axes", "increments"];
+    let saved = [&axes[..], &["--save-reference", arg(&file)]].concat();
+    assert_eq!(accuracy(&scene, &out, &saved).code, 0);
+    let scene = short_clip(dir.path(), "friction_coefficient = 0.2\nfriction = \"off\"");
+    let refused = accuracy(
+        &scene,
+        &out,
+        &[&axes[..], &["--reference", arg(&file)]].concat(),
+    );
+    assert_eq!(refused.code, 2, "{}", refused.err);
+    assert!(
+        refused.err.contains("coupling or friction differ"),
+        "{}",
+        refused.err
+    );
+}
+
+#[test]
+fn without_friction_there_are_no_increments_to_choose_and_with_it_no_two_rates() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("study");
+    // Called for from 0.035 on.
+    let scene = short_clip(dir.path(), "friction_coefficient = 0.03");
+    let outcome = accuracy(&scene, &out, &["--axes", "increments"]);
+    assert_eq!(outcome.code, 0, "{}", outcome.err);
+    let study = json(&out);
+    assert_eq!(rows(&study).len(), 0);
+    assert_eq!(study["law"]["has_friction"], false);
+    assert!(
+        outcome
+            .out
+            .contains("changes the force by less than a tenth"),
+        "{}",
+        outcome.out
+    );
+    let sentence = study["sentence"].as_str().unwrap();
+    assert!(
+        sentence.contains("without friction the force at a place does not depend"),
+        "{sentence}"
+    );
+
+    let scene = short_clip(
+        dir.path(),
+        "friction_coefficient = 0.2\n[accuracy]\nrates = { every = 5 }",
+    );
+    let refused = accuracy(&scene, &out, &[]);
+    assert_eq!(refused.code, 2, "{}", refused.err);
+    let told = "clip.toml: accuracy.rates asks for two rates, and the scene for friction";
+    assert!(refused.err.contains(told), "{}", refused.err);
 }
 
 fn rows(study: &Value) -> Vec<Value> {
@@ -268,8 +413,9 @@ fn the_study_of_a_tool_with_edges_comes_to_its_end() {
 #[test]
 fn a_folder_with_other_files_and_an_unknown_choice_are_refused() {
     let dir = tempfile::tempdir().unwrap();
+    let scene = root().join("scenes/clip.toml");
     fs::write(dir.path().join("thesis.tex"), "years of work").unwrap();
-    let refused = accuracy(dir.path(), &[]);
+    let refused = accuracy(&scene, dir.path(), &[]);
     assert_eq!(refused.code, 2);
     assert!(refused.err.contains("--out"), "{}", refused.err);
     assert!(dir.path().join("thesis.tex").exists());
@@ -277,11 +423,11 @@ fn a_folder_with_other_files_and_an_unknown_choice_are_refused() {
     let points = dir.path().join("points");
     fs::create_dir(&points).unwrap();
     fs::write(points.join("measured.json"), "years of work").unwrap();
-    let refused = accuracy(dir.path(), &["--fresh"]);
+    let refused = accuracy(&scene, dir.path(), &["--fresh"]);
     assert_eq!(refused.code, 2);
     assert!(points.join("measured.json").exists());
 
-    let unknown = accuracy(&dir.path().join("out"), &["--axes", "speed"]);
+    let unknown = accuracy(&scene, &dir.path().join("out"), &["--axes", "speed"]);
     assert_eq!(unknown.code, 2);
     assert!(
         unknown

@@ -7,11 +7,14 @@
 
 mod busy;
 mod compare;
+mod course;
+mod law;
 mod measure;
 mod page;
 mod peak;
 mod pick;
 mod point;
+mod reference;
 mod store;
 mod table;
 
@@ -21,6 +24,8 @@ use std::time::Instant;
 
 pub use busy::Repeats;
 pub use compare::{Errors, Reference};
+pub use course::Increment;
+pub use law::Law;
 pub use measure::{Measured, Times};
 pub use page::write;
 pub use pick::{Picked, resolved};
@@ -29,25 +34,20 @@ pub use table::text;
 
 use crate::choice::name_of;
 use crate::machine::Machine;
-use crate::prepare::{PrepareOptions, budget::Forecast, load};
+use crate::prepare::{PrepareOptions, load};
 use crate::progress::Ui;
 use crate::report::Origin;
-use crate::scene::{Accuracy, Handle, Multiply, Preset, Scene};
+use crate::scene::{Multiply, Scene};
 use crate::session::part_extent;
 use crate::{Error, interrupt, plausibility, setup};
-use compare::{Scales, distance, errors};
-use measure::{Course, Samples};
+use compare::{Scales, errors};
+use course::Course;
+use measure::Samples;
+use point::Surroundings;
 use store::Store;
-
-/// Seconds that preparing the reference may take by its forecast, and in a quick study.
-const REFERENCE_S: f64 = 120.0;
-const QUICK_REFERENCE_S: f64 = 5.0;
 
 /// Curves that peak at more than this multiple of the reference would hide the others.
 const OFF_SCALE: f64 = 2.0;
-
-/// Planes of the exact solution: enough for any part that is touched at nodes.
-const MOST_CONTACTS: usize = 500;
 
 /// What is asked for.
 #[derive(Clone, Debug)]
@@ -75,6 +75,8 @@ pub struct Row {
     pub label: String,
     /// Whether it is the scene's own setting.
     pub is_own: bool,
+    /// m between two steps.
+    pub increment: f64,
     /// Result and errors, or why there is none.
     pub outcome: Result<(Measured, Errors), String>,
 }
@@ -88,6 +90,8 @@ pub struct Study {
     pub scene_path: String,
     /// The scene's own settings in words.
     pub own: String,
+    /// The law of contact of all settings, the reference included.
+    pub law: Law,
     /// Where it ran.
     pub machine: String,
     /// When it ended, and from what.
@@ -112,7 +116,7 @@ pub struct Study {
     pub n_resumed: usize,
     /// Name of the graphics adapter that multiplied in some settings.
     pub adapter: Option<String>,
-    /// A choice that this machine does not have, with the reason.
+    /// A choice that this scene or this machine does not have, with the reason.
     pub not_there: Vec<(&'static str, String)>,
 }
 
@@ -128,35 +132,21 @@ pub fn run(
     ui: &Ui<'_>,
 ) -> Result<Study, Error> {
     let load_average = sysinfo::System::load_average().one;
-    if scene.effects.friction_coefficient.is_some() {
-        ui.note("friction is left out of this study, which weighs errors by the energy that a part gives back");
-    }
-    let mut scene = scene.with_friction(false);
+    let (mut scene, mut law) = law::decided(scene, prepare, ui)?;
     scene.accuracy.budget_us = None;
     let own_order = store::own_order(&scene)?;
     scene.part.order.get_or_insert(own_order);
     point::multiply_written(&mut scene);
     let scene = &scene;
-    // Drivers are asked only if a setting may need them.
-    let asks_gpu = options.axes.contains(&Axis::Scalar) || scene.accuracy.multiply == Multiply::Gpu;
-    let adapters = asks_gpu.then(gpu::Adapters::find);
-    let best = adapters.as_ref().and_then(|found| found.best(true).ok());
-    let adapter = best.map(name_of);
-    let not_there = match (&adapters, &adapter) {
-        (Some(found), None) => vec![("multiply on the GPU", found.to_string())],
-        _ => Vec::new(),
-    };
+    let (adapter, not_there) = choices(scene, &options.axes);
     let identity = store::identity(scene)?;
     let course = Course::of(scene);
-    let reference_file = match &options.reference {
-        Some(file) => Some(store::read_reference(
-            file,
-            scene,
-            &identity,
-            course.targets.len(),
-        )?),
-        None => None,
-    };
+    law.tell_increments(&course);
+    let n_places = course.n_places();
+    let reference_file = options.reference.as_ref();
+    let reference_file = reference_file
+        .map(|file| store::read_reference(file, scene, &identity, n_places))
+        .transpose()?;
     let folder = options.out.join("points");
     if options.fresh {
         store::forget(&folder);
@@ -173,19 +163,10 @@ pub fn run(
         n_resumed: 0,
         adapter,
     };
-    let own = runner.base(scene);
     let loaded = load(&setup::part_spec(scene)?)?;
     plausibility::tell(&plausibility::of_part(scene, &loaded), ui);
-    let scales = Scales {
-        direction: match scene.handle {
-            Handle::Tool => scene.drive.direction,
-            Handle::Part => -scene.drive.direction,
-        }
-        .to_array(),
-        lever: part_extent(&loaded.mesh),
-        travel: scene.drive.travel,
-    };
-    runner.run(&own)?;
+    let scales = Scales::of(scene, part_extent(&loaded.mesh));
+    runner.run(&runner.base(scene))?;
     let reference = match reference_file {
         Some(reference) => reference,
         None => runner.overkill(scene, &scales)?,
@@ -193,41 +174,62 @@ pub fn run(
     if let Some(file) = &options.save_reference {
         store::save_reference(file, scene, &identity, &reference)?;
     }
+    let rows = runner.rows(scene, &reference, &scales)?;
+    let (curves, off_scale) = curves(&rows, &reference, &scales);
+    let machine = Machine::read();
+    let peak = scales.peak(&reference.wrench);
+    Ok(Study {
+        title: scene.title.clone(),
+        scene_path: scene.path.display().to_string(),
+        own: scene.accuracy.words(),
+        law,
+        machine: machine.summary(),
+        origin: crate::origin::read(scene, None)?,
+        peak: (peak.force, scales.travel_at(peak.at, n_places)),
+        is_snap: peak.is_snap,
+        load: load_average,
+        cores: machine.cores,
+        rows,
+        reference,
+        curves,
+        off_scale,
+        n_resumed: runner.n_resumed,
+        adapter: runner.adapter,
+        not_there,
+    })
+}
 
-    let points = point::points(
-        scene,
-        &options.axes,
-        store::own_order(scene)?,
-        scales.lever,
-        runner.adapter.as_deref(),
-    );
-    let mut rows = Vec::with_capacity(points.len());
-    let begun = Instant::now();
-    for (k, point) in points.iter().enumerate() {
-        runner.tell(
-            k,
-            points.len(),
-            begun,
-            &format!("{} {}", point.axis.name(), point.label),
-        );
-        let outcome = match runner.run_beside_exact(&point.setting) {
-            Ok((measured, exact)) => {
-                let errors = errors(&measured, &exact, &reference, &scales);
-                Ok((measured, errors))
-            }
-            Err(e) if e.is_interrupt() => return Err(e),
-            Err(e) => Err(e.to_string()),
-        };
-        rows.push(Row {
-            axis: point.axis,
-            label: point.label.clone(),
-            is_own: point.setting.key() == own.key(),
-            outcome,
-        });
+/// Name of the graphics adapter that multiplies in some settings, and the choices that are asked for and not there.
+fn choices(scene: &Scene, axes: &[Axis]) -> (Option<String>, Vec<(&'static str, String)>) {
+    // Drivers are asked only if a setting may need them.
+    let asks_gpu = axes.contains(&Axis::Scalar) || scene.accuracy.multiply == Multiply::Gpu;
+    let adapters = asks_gpu.then(gpu::Adapters::find);
+    let best = adapters.as_ref().and_then(|found| found.best(true).ok());
+    let adapter = best.map(name_of);
+    let mut not_there = Vec::new();
+    if let (Some(found), None) = (&adapters, &adapter) {
+        not_there.push(("multiply on the GPU", found.to_string()));
     }
+    let reasons = axes.iter().filter_map(|&axis| {
+        let why = point::reason_for_none(axis, scene)?;
+        Some((axis.title(), why.to_owned()))
+    });
+    not_there.extend(reasons);
+    (adapter, not_there)
+}
+
+/// Force (N) over travel (m) with its name.
+type Curve = (String, Vec<(f64, f64)>);
+
+/// Curves of the reference, the orders and the meshes, and those that are too large to be shown, with their peaks (N).
+fn curves(
+    rows: &[Row],
+    reference: &Reference,
+    scales: &Scales,
+) -> (Vec<Curve>, Vec<(String, f64)>) {
     let curve = |wrenches: &[[f64; 6]]| -> Vec<(f64, f64)> {
-        let last = wrenches.len().saturating_sub(1).max(1) as f64;
-        let at = |(k, w)| (scales.travel * k as f64 / last, scales.resistance(w));
+        let n = wrenches.len();
+        let at = |(k, w)| (scales.travel_at(k, n), scales.resistance(w));
         wrenches.iter().enumerate().map(at).collect()
     };
     let mut curves = vec![("reference".to_owned(), curve(&reference.wrench))];
@@ -243,29 +245,7 @@ pub fn run(
             }
         }
     }
-    let machine = Machine::read();
-    let peak = scales.peak(&reference.wrench);
-    Ok(Study {
-        title: scene.title.clone(),
-        scene_path: scene.path.display().to_string(),
-        own: scene.accuracy.words(),
-        machine: machine.summary(),
-        origin: crate::origin::read(scene, None)?,
-        peak: (
-            peak.force,
-            scales.travel_at(peak.at, reference.wrench.len()),
-        ),
-        is_snap: peak.is_snap,
-        load: load_average,
-        cores: machine.cores,
-        rows,
-        reference,
-        curves,
-        off_scale,
-        n_resumed: runner.n_resumed,
-        adapter: runner.adapter,
-        not_there,
-    })
+    (curves, off_scale)
 }
 
 /// Runs settings, each once.
@@ -304,6 +284,47 @@ impl Runner<'_, '_> {
         self.ui.status(&line);
     }
 
+    /// All settings that are asked for, each compared.
+    fn rows(
+        &mut self,
+        scene: &Scene,
+        reference: &Reference,
+        scales: &Scales,
+    ) -> Result<Vec<Row>, Error> {
+        let own = self.base(scene).key();
+        let around = Surroundings {
+            own_order: store::own_order(scene)?,
+            extent: scales.lever,
+            adapter: self.adapter.as_deref(),
+            course: &self.course,
+        };
+        let points = point::points(scene, &self.options.axes, &around);
+        let mut rows = Vec::with_capacity(points.len());
+        let begun = Instant::now();
+        for (k, point) in points.iter().enumerate() {
+            let what = format!("{} {}", point.axis.name(), point.label);
+            self.tell(k, points.len(), begun, &what);
+            let increment = point.setting.increment;
+            let outcome = match self.run_beside_exact(&point.setting) {
+                Ok((measured, exact)) => {
+                    let places = self.course.places(increment);
+                    let errors = errors(&measured, &places, &exact, reference, scales);
+                    Ok((measured, errors))
+                }
+                Err(e) if e.is_interrupt() => return Err(e),
+                Err(e) => Err(e.to_string()),
+            };
+            rows.push(Row {
+                axis: point.axis,
+                label: point.label.clone(),
+                is_own: point.setting.key() == own,
+                increment: self.course.length(increment),
+                outcome,
+            });
+        }
+        Ok(rows)
+    }
+
     /// The setting's result: of this run, of an earlier one, or anew.
     fn run(&mut self, setting: &Setting) -> Result<Measured, Error> {
         if interrupt::is_requested() {
@@ -325,13 +346,7 @@ impl Runner<'_, '_> {
     /// The setting's result, and the wrenches of the exact solution on its mesh.
     fn run_beside_exact(&mut self, setting: &Setting) -> Result<(Measured, Vec<[f64; 6]>), Error> {
         let measured = self.run(setting)?;
-        let mut exact = setting.clone();
-        // Wrenches do not depend on where the shape is multiplied.
-        exact.scene.accuracy.multiply = Multiply::Cpu;
-        point::set_accuracy(&mut exact.scene, Accuracy::of(Some(Preset::Exact)));
-        exact.scene.accuracy.preset = None;
-        exact.scene.accuracy.max_contacts = exact.scene.accuracy.max_contacts.max(MOST_CONTACTS);
-        let exact = self.run(&exact)?;
+        let exact = self.run(&reference::exact_on(setting))?;
         Ok((measured, exact.wrench))
     }
 
@@ -358,92 +373,12 @@ impl Runner<'_, '_> {
             self.n_resumed += 1;
             return Ok(found);
         }
-        let mut measured = measure::measure(
-            &mut ready,
-            &setting.scene,
-            &self.course,
-            samples,
-            self.options.timed_s,
-        )?;
+        let timed_s = self.options.timed_s;
+        let mut measured = measure::measure(&mut ready, setting, &self.course, samples, timed_s)?;
         measured.prepare_s = prepare_s;
         self.store.keep(setting, self.options.timed_s, &measured)?;
         Ok(measured)
     }
-
-    /// The most accurate run that can be prepared in [`REFERENCE_S`], and how wrong it may be.
-    fn overkill(&mut self, scene: &Scene, scales: &Scales) -> Result<Reference, Error> {
-        let exact = |order: u8, refinements: u8| {
-            let mut setting = point::base(scene, None);
-            setting.scene.accuracy.multiply = Multiply::Cpu;
-            point::set_accuracy(&mut setting.scene, Accuracy::of(Some(Preset::Exact)));
-            setting.scene.accuracy.preset = None;
-            point::set_order(&mut setting.scene, order);
-            setting.refinements = refinements;
-            setting
-        };
-        // Each beside a coarser one, whose difference bounds its error.
-        let ladder = [
-            ((3, 1), (2, 1), "each element in eight at order 3"),
-            ((2, 1), (2, 0), "each element in eight at order 2"),
-            ((3, 0), (2, 0), "the scene's mesh at order 3"),
-        ];
-        let limit_s = match self.options.timed_s {
-            Some(_) => QUICK_REFERENCE_S,
-            None => REFERENCE_S,
-        };
-        for (best, coarser, made) in ladder {
-            let setting = exact(best.0, best.1);
-            if self.store.find(&setting, self.options.timed_s).is_none()
-                && !can_be_prepared(&setting, limit_s)?
-            {
-                continue;
-            }
-            self.ui.status(&format!("reference: {made}"));
-            let (Ok(fine), Ok(coarse)) =
-                (self.run(&setting), self.run(&exact(coarser.0, coarser.1)))
-            else {
-                if interrupt::is_requested() {
-                    return Err(Error::Interrupted);
-                }
-                continue;
-            };
-            return Ok(Reference {
-                made: format!(
-                    "{made} ({} nodes), planes converged, LCP to 1e-13",
-                    fine.nodes
-                ),
-                bar: Some(distance(&coarse.wrench, &fine.wrench, scales)),
-                bar_made: format!(
-                    "difference from {} nodes at order {}, which Richardson's rule takes for the \
-                     error at first order and for more than it above",
-                    coarse.nodes, coarse.order
-                ),
-                wrench: fine.wrench,
-                potential: fine.potential,
-                displacement: fine.displacement,
-            });
-        }
-        let own = self.run(&self.base(scene))?;
-        Ok(Reference {
-            made: "the scene's own setting: nothing finer could be prepared".to_owned(),
-            bar: None,
-            bar_made: "not known: errors are differences within the scene's mesh".to_owned(),
-            wrench: own.wrench,
-            potential: own.potential,
-            displacement: own.displacement,
-        })
-    }
-}
-
-/// Whether the forecast of preparing is within time and memory.
-fn can_be_prepared(setting: &Setting, limit_s: f64) -> Result<bool, Error> {
-    let mut spec = setup::part_spec(&setting.scene)?;
-    spec.refinements = setting.refinements;
-    let Ok(loaded) = load(&spec) else {
-        return Ok(false);
-    };
-    let forecast = Forecast::of(&loaded);
-    Ok(forecast.seconds < limit_s && forecast.refuse_what_cannot_fit(&loaded).is_ok())
 }
 
 /// A folder that results may be written into: new, empty, or of an earlier study, finished or not. Files of the user in

@@ -2,8 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::course::Places;
 use super::measure::Measured;
 use super::peak::{Peak, snap};
+use crate::scene::{Handle, Scene};
 
 /// How far a setting is from the reference. `None`: not comparable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -22,8 +24,12 @@ pub struct Errors {
     pub peak_travel: Option<f64>,
     /// ‖u - u_ref‖ / ‖u_ref‖ of the drawn displacement where the part can touch.
     pub displacement: Option<f64>,
-    /// sqrt(2 |Π - Π_ref|) / sqrt(2 Π_ref) at the peak of the reference's energy.
-    pub energy: f64,
+    /// sqrt(2 |Π - Π_ref|) / sqrt(2 Π_ref) at the peak of the reference's energy, which is the energy norm of the
+    /// difference where the energy is least at the solution. With friction it is not, and there is none.
+    pub energy: Option<f64>,
+    /// (A - A_ref) / A_ref of the work put in, ∫ F dx, where the reference's is largest: what it takes to push the body over,
+    /// which friction spends in part. With friction only; without, that work is the energy.
+    pub work: Option<f64>,
 }
 
 /// What a setting is compared with.
@@ -35,12 +41,26 @@ pub struct Reference {
     pub bar: Option<f64>,
     /// How the bar was found.
     pub bar_made: String,
-    /// On the tool by step, as [`Measured::wrench`].
+    /// On the tool by place, as [`Measured::wrench`], at all places of the course.
     pub wrench: Vec<[f64; 6]>,
     /// J, as [`Measured::potential`].
     pub potential: Vec<f64>,
     /// m, as [`Measured::displacement`].
     pub displacement: Vec<f64>,
+}
+
+impl Reference {
+    /// Of a run, with nothing said of it yet.
+    pub(super) fn of(measured: Measured) -> Self {
+        Self {
+            made: String::new(),
+            bar: None,
+            bar_made: String::new(),
+            wrench: measured.wrench,
+            potential: measured.potential,
+            displacement: measured.displacement,
+        }
+    }
 }
 
 /// Direction of the approach and what makes numbers comparable.
@@ -52,9 +72,25 @@ pub(super) struct Scales {
     pub(super) lever: f64,
     /// m, of the whole path.
     pub(super) travel: f64,
+    /// Whether work is compared, in place of energy.
+    pub(super) has_friction: bool,
 }
 
 impl Scales {
+    /// `lever`: extent of the part, m.
+    pub(super) fn of(scene: &Scene, lever: f64) -> Self {
+        Self {
+            direction: match scene.handle {
+                Handle::Tool => scene.drive.direction,
+                Handle::Part => -scene.drive.direction,
+            }
+            .to_array(),
+            lever,
+            travel: scene.drive.travel,
+            has_friction: scene.effects.simulated_friction().is_some(),
+        }
+    }
+
     fn size(&self, wrench: &[f64; 6]) -> f64 {
         let scaled = wrench
             .iter()
@@ -76,6 +112,17 @@ impl Scales {
     /// m, the travel at a step of the path.
     pub(super) fn travel_at(&self, step: usize, n_steps: usize) -> f64 {
         self.travel * step as f64 / n_steps.saturating_sub(1).max(1) as f64
+    }
+
+    /// J, work of the held body up to each of some places, by trapezoids. `travels`: m.
+    fn work(&self, wrenches: &[[f64; 6]], travels: &[f64]) -> Vec<f64> {
+        let mut sum = 0.0;
+        let steps = wrenches.windows(2).zip(travels.windows(2));
+        let of_steps = steps.map(|(w, x)| {
+            sum += 0.5 * (self.resistance(&w[0]) + self.resistance(&w[1])) * (x[1] - x[0]);
+            sum
+        });
+        [0.0].into_iter().chain(of_steps).collect()
     }
 
     /// N, largest resistance.
@@ -104,33 +151,50 @@ fn ratio(a: f64, b: f64) -> f64 {
     if a == 0.0 { 0.0 } else { a / b }
 }
 
-/// Compares along the whole path.
-/// `exact`: the wrenches of the exact solution on the same mesh.
+/// Numbers of a path at some of its places.
+pub(super) fn at<T: Copy>(places: &[usize], path: &[T]) -> Vec<T> {
+    places.iter().map(|k| path[*k]).collect()
+}
+
+/// Compares along the whole path, at the places that all settings come to; the peak where this one goes.
+/// `exact`: the wrenches of the exact solution on the same mesh, at all places of the course.
 pub(super) fn errors(
     measured: &Measured,
+    places: &Places,
     exact: &[[f64; 6]],
     reference: &Reference,
     scales: &Scales,
 ) -> Errors {
+    let Places { gone, common } = places;
+    let there = places.common_of_gone();
+    let wrench = at(&there, &measured.wrench);
+    let (exact, wrench_ref) = (at(common, exact), at(common, &reference.wrench));
     let largest = |path: &[[f64; 6]]| path.iter().map(|w| scales.size(w)).fold(0.0, f64::max);
-    let difference = differences(&measured.wrench, &reference.wrench);
+    let difference = differences(&wrench, &wrench_ref);
     let (peak, peak_ref) = (
         scales.peak(&measured.wrench),
-        scales.peak(&reference.wrench),
+        scales.peak(&at(gone, &reference.wrench)),
     );
     let are_alike = peak.is_snap == peak_ref.is_snap;
-    let travel = |peak: Peak| scales.travel_at(peak.at, measured.wrench.len());
-    let top = (0..reference.potential.len())
-        .max_by(|a, b| reference.potential[*a].total_cmp(&reference.potential[*b]))
-        .unwrap_or(0);
-    let of = |values: &[f64]| values.get(top).copied().unwrap_or(0.0);
-    let gap = of(&measured.potential) - of(&reference.potential);
+    let travel_at = |place: usize| scales.travel_at(place, reference.wrench.len());
+    let travel = |peak: Peak| travel_at(gone[peak.at]);
     let same_samples = !reference.displacement.is_empty()
         && measured.displacement.len() == reference.displacement.len();
+    let (energy, work) = if scales.has_friction {
+        let travels: Vec<f64> = common.iter().map(|k| travel_at(*k)).collect();
+        let of = |wrenches: &[[f64; 6]]| scales.work(wrenches, &travels);
+        let (own, reference) = at_top(&of(&wrench), &of(&wrench_ref));
+        (None, Some(ratio(own - reference, reference)))
+    } else {
+        let of_reference = at(common, &reference.potential);
+        let (own, reference) = at_top(&at(&there, &measured.potential), &of_reference);
+        let energy = ratio(2.0 * (own - reference).abs(), 2.0 * reference).sqrt();
+        (Some(energy), None)
+    };
     Errors {
-        wrench_l2: distance(&measured.wrench, &reference.wrench, scales),
-        solver_l2: distance(&measured.wrench, exact, scales),
-        wrench_max: ratio(largest(&difference), largest(&reference.wrench)),
+        wrench_l2: distance(&wrench, &wrench_ref, scales),
+        solver_l2: distance(&wrench, &exact, scales),
+        wrench_max: ratio(largest(&difference), largest(&wrench_ref)),
         peak: are_alike.then(|| ratio(peak.force - peak_ref.force, peak_ref.force)),
         peak_travel: are_alike.then(|| travel(peak) - travel(peak_ref)),
         displacement: same_samples.then(|| {
@@ -139,8 +203,15 @@ pub(super) fn errors(
             let apart = squared(&mut u.iter().zip(v).map(|(a, b)| a - b));
             ratio(apart, squared(&mut v.iter().copied())).sqrt()
         }),
-        energy: ratio(2.0 * gap.abs(), 2.0 * of(&reference.potential)).sqrt(),
+        energy,
+        work,
     }
+}
+
+/// Of two lists of numbers along the way, the ones where the second is largest.
+fn at_top(own: &[f64], reference: &[f64]) -> (f64, f64) {
+    let pairs = own.iter().copied().zip(reference.iter().copied());
+    pairs.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default()
 }
 
 /// Positions of the settings that no other beats in both time and error, by ascending time.
@@ -169,7 +240,15 @@ mod tests {
         direction: [0.0, -1.0, 0.0],
         lever: 0.1,
         travel: 0.01,
+        has_friction: false,
     };
+
+    fn all() -> Places {
+        Places {
+            gone: vec![0, 1, 2, 3, 4],
+            common: vec![0, 1, 2, 3, 4],
+        }
+    }
 
     fn path(scale: f64) -> Vec<[f64; 6]> {
         [0.0, 1.0, 4.0, 2.0, -3.0]
@@ -201,20 +280,12 @@ mod tests {
     }
 
     fn reference() -> Reference {
-        let of = measured(1.0);
-        Reference {
-            made: "test".to_owned(),
-            bar: None,
-            bar_made: String::new(),
-            wrench: of.wrench,
-            potential: of.potential,
-            displacement: of.displacement,
-        }
+        Reference::of(measured(1.0))
     }
 
     #[test]
     fn a_tenth_more_force_is_a_tenth_of_error_everywhere() {
-        let errors = errors(&measured(1.1), &path(1.1), &reference(), &SCALES);
+        let errors = errors(&measured(1.1), &all(), &path(1.1), &reference(), &SCALES);
         for error in [
             errors.wrench_l2,
             errors.wrench_max,
@@ -225,17 +296,55 @@ mod tests {
         }
         assert_eq!((errors.peak_travel, errors.solver_l2), (Some(0.0), 0.0));
         // Energy a tenth larger: the root of it.
-        assert!((errors.energy - 0.1f64.sqrt()).abs() < 1e-12);
+        assert!((errors.energy.unwrap() - 0.1f64.sqrt()).abs() < 1e-12);
         let peak = SCALES.peak(&path(1.0));
         assert_eq!((peak.force, peak.is_snap), (4.0, true));
         assert_eq!(SCALES.travel_at(peak.at, 5), 0.005);
+    }
+
+    /// 60 J of the path of forces 0, 1, 4, 2 at 0, 10, 20 and 30 m; what comes after gives 5 back.
+    #[test]
+    fn with_friction_the_work_put_in_is_compared_where_it_is_largest() {
+        let scales = Scales {
+            travel: 40.0,
+            has_friction: true,
+            ..SCALES
+        };
+        let found = errors(&measured(1.1), &all(), &path(1.0), &reference(), &scales);
+        assert_eq!(found.energy, None);
+        assert!((found.work.unwrap() - 0.1).abs() < 1e-12, "{found:?}");
+        let travels = [0.0, 10.0, 20.0, 30.0, 40.0];
+        let work = scales.work(&path(1.0), &travels);
+        assert_eq!(work, [0.0, 5.0, 30.0, 60.0, 55.0]);
+    }
+
+    /// A way in larger increments comes to each second place: path and work of all settings are compared there, so that
+    /// what happens between shows in none of them, and peaks where each goes.
+    #[test]
+    fn other_increments_are_compared_at_the_places_that_all_come_to() {
+        let common = vec![0, 2, 4];
+        let mut coarse = measured(1.0);
+        coarse.wrench = at(&common, &path(1.0));
+        coarse.potential = at(&common, &coarse.potential);
+        let mut fine = measured(1.0);
+        fine.wrench[3][1] += 0.1;
+        for (setting, gone) in [(coarse, common.clone()), (fine, all().gone)] {
+            let places = Places {
+                gone,
+                common: common.clone(),
+            };
+            let errors = errors(&setting, &places, &path(1.0), &reference(), &SCALES);
+            assert_eq!((errors.wrench_l2, errors.solver_l2), (0.0, 0.0));
+            assert_eq!((errors.peak, errors.peak_travel), (Some(0.0), Some(0.0)));
+            assert_eq!(errors.energy, Some(0.0));
+        }
     }
 
     #[test]
     fn a_snap_is_not_compared_with_a_largest_force() {
         let mut other = measured(1.0);
         other.wrench[3..].fill([0.0, 5.0, 0.0, 0.0, 0.0, 0.0]);
-        let errors = errors(&other, &path(1.0), &reference(), &SCALES);
+        let errors = errors(&other, &all(), &path(1.0), &reference(), &SCALES);
         assert_eq!((errors.peak, errors.peak_travel), (None, None));
     }
 
@@ -243,7 +352,7 @@ mod tests {
     fn a_torque_counts_by_its_lever() {
         let mut turned = measured(1.0);
         turned.wrench[2][5] = 0.05;
-        let errors = errors(&turned, &path(1.0), &reference(), &SCALES);
+        let errors = errors(&turned, &all(), &path(1.0), &reference(), &SCALES);
         assert!((errors.wrench_max - 0.5 / 4.0).abs() < 1e-12, "{errors:?}");
     }
 
@@ -252,7 +361,7 @@ mod tests {
         let mut other = measured(1.0);
         other.displacement.clear();
         assert_eq!(
-            errors(&other, &path(1.0), &reference(), &SCALES).displacement,
+            errors(&other, &all(), &path(1.0), &reference(), &SCALES).displacement,
             None
         );
     }

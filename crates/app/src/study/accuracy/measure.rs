@@ -12,22 +12,16 @@ use glamx::DPose3;
 use serde::{Deserialize, Serialize};
 
 use super::busy::Repeats;
+use super::course::{Course, Stop};
 use super::point::Setting;
 use crate::engine::{Engine, N_STAGES, Stage};
 use crate::prepare::{PrepareOptions, PreparedPart, prepare};
 use crate::progress::Ui;
 use crate::report::summary::Percentiles;
-use crate::scene::{Hand, Handle, Rates, Scene};
-use crate::session::{Held, Holds};
+use crate::scene::Rates;
 use crate::shape::Shape;
 use crate::{Error, interrupt, setup};
 pub(super) use samples::Samples;
-
-/// Steps of a path at most.
-const MOST_STEPS: usize = 1000;
-
-/// Moments at which displacement and penetration are looked at.
-const MOMENTS: usize = 30;
 
 /// Least time of timed steps with contact, s, and most rounds.
 const TIMED_S: f64 = 0.6;
@@ -38,44 +32,6 @@ const MOST_ROUNDS: usize = 20;
 const FEWEST_ROUNDS: usize = 2;
 const REPEATED_ROUNDS: usize = 4;
 const MOST_TIME: f64 = 10.0;
-
-/// How the held body goes: from the start to the end of its travel, rigidly as in the part's own curve, so
-/// that all settings are asked the same question.
-#[derive(Clone, Debug)]
-pub(super) struct Course {
-    pub(super) targets: Vec<DPose3>,
-}
-
-impl Course {
-    pub(super) fn of(scene: &Scene) -> Self {
-        let drive = &scene.drive;
-        let per_period = |hand: &Hand| hand.speed * scene.device.servo_period;
-        let per_step = scene.hand.as_ref().map_or(drive.step, per_period);
-        let n = ((drive.travel / per_step).ceil() as usize).clamp(1, MOST_STEPS);
-        // Nothing turns, so that where the body is held does not matter.
-        let held = Held {
-            holds: match scene.handle {
-                Handle::Tool => Holds::Tool,
-                Handle::Part => Holds::Part,
-            },
-            grip: DVec3::ZERO,
-            tool_pose: scene.tool.pose_part_tool,
-        };
-        let targets = (0..=n)
-            .map(|k| {
-                let shift = drive.travel * k as f64 / n as f64 * drive.direction;
-                held.target(&held.along(shift))
-            })
-            .collect();
-        Self { targets }
-    }
-
-    /// Steps at which displacement and penetration are looked at.
-    fn moments(&self) -> Vec<usize> {
-        let n = self.targets.len();
-        (1..=MOMENTS).map(|i| i * (n - 1) / MOMENTS).collect()
-    }
-}
 
 /// Percentiles of a time, µs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -180,16 +136,16 @@ pub struct Measured {
     pub certificate: f64,
     /// m, deepest that a node was inside the tool.
     pub penetration: f64,
-    /// On the tool about the point at which it is held, by step: force (N) and torque (N m).
+    /// On the tool about the point at which it is held, by place: force (N) and torque (N m).
     pub wrench: Vec<[f64; 6]>,
-    /// J, strain energy and that of a free guide's springs, by step.
+    /// J, strain energy and that of a free guide's springs, by place.
     pub potential: Vec<f64>,
     /// m, drawn displacement at the samples by moment; empty if the mesh does not have them.
     pub displacement: Vec<f64>,
 }
 
 impl Measured {
-    fn nothing_yet(prepared: &PreparedPart, n_steps: usize) -> Self {
+    fn nothing_yet(prepared: &PreparedPart, n_places: usize) -> Self {
         Self {
             nodes: prepared.loaded.mesh.n_nodes(),
             elements: prepared.loaded.mesh.n_elements(),
@@ -206,8 +162,8 @@ impl Measured {
             not_converged: 0,
             certificate: 0.0,
             penetration: 0.0,
-            wrench: Vec::with_capacity(n_steps),
-            potential: Vec::with_capacity(n_steps),
+            wrench: Vec::with_capacity(n_places),
+            potential: Vec::with_capacity(n_places),
             displacement: Vec::new(),
         }
     }
@@ -243,21 +199,37 @@ pub(super) fn ready(
     })
 }
 
-/// Drives a setting along the course: once for its results, then for its times.
+/// Drives a setting along the course: once for its results, then for its times, but for what only serves as a reference.
 ///
 /// # Errors
 /// Ctrl-C.
 pub(super) fn measure(
     ready: &mut Ready,
-    scene: &Scene,
+    setting: &Setting,
     course: &Course,
     samples: &Samples,
     timed_s: Option<f64>,
 ) -> Result<Measured, Error> {
     let timed_s = timed_s.unwrap_or(TIMED_S);
-    if let Rates::Every(every) = scene.accuracy.rates {
-        return two_rates::measure(ready, scene, course, u64::from(every), timed_s);
+    if let Rates::Every(every) = setting.scene.accuracy.rates {
+        return two_rates::measure(ready, setting, course, u64::from(every), timed_s);
     }
+    let way = course.way(setting.increment);
+    // The first round is for what is computed; it also warms up.
+    let mut found = computed(ready, &way, course, samples)?;
+    if setting.increment.is_compared() {
+        time(ready, &way, timed_s, &mut found)?;
+    }
+    Ok(found)
+}
+
+/// What a setting computes.
+fn computed(
+    ready: &mut Ready,
+    way: &[Stop],
+    course: &Course,
+    samples: &Samples,
+) -> Result<Measured, Error> {
     let Ready {
         prepared,
         engine,
@@ -265,15 +237,17 @@ pub(super) fn measure(
     } = ready;
     let rows = samples.in_part(prepared);
     let edges = contact_edges(prepared);
-    let mut contact_wrench = Vec::with_capacity(course.targets.len());
     let moments = course.moments();
-    let mut found = Measured::nothing_yet(prepared, course.targets.len());
-
-    // First round: what is computed; it also warms up.
+    let mut found = Measured::nothing_yet(prepared, course.n_places());
     engine.reset();
-    for (k, target) in course.targets.iter().enumerate() {
-        let report = engine.step(target);
-        contact_wrench.push(report.contact_wrench_on_tool);
+    for stop in way {
+        let report = engine.step(&stop.target);
+        found.contacts = found.contacts.max(report.contacts);
+        found.not_converged += usize::from(!report.converged);
+        found.certificate = found.certificate.max(report.certificate);
+        let Some(place) = stop.place else {
+            continue;
+        };
         found.wrench.push(report.contact_wrench_on_tool);
         let of_guide = engine.energy_of_guide(&report.contact_wrench_on_tool);
         let contacts = engine.active_contacts().to_vec();
@@ -286,11 +260,8 @@ pub(super) fn measure(
             })
             .sum();
         found.potential.push(of_guide + of_part);
-        found.contacts = found.contacts.max(report.contacts);
-        found.not_converged += usize::from(!report.converged);
-        found.certificate = found.certificate.max(report.certificate);
         let u = shape.update(engine)?;
-        if moments.contains(&k)
+        if moments.contains(&place)
             && let Some(rows) = &rows
         {
             for weights in rows {
@@ -302,7 +273,7 @@ pub(super) fn measure(
         }
         let free = shape.n_free().unwrap_or(0);
         found.free_nodes = found.free_nodes.max(free);
-        if moments.contains(&k) {
+        if moments.contains(&place) {
             if interrupt::is_requested() {
                 return Err(Error::Interrupted);
             }
@@ -312,23 +283,32 @@ pub(super) fn measure(
             found.penetration = found.penetration.max(deepest);
         }
     }
+    Ok(found)
+}
 
+/// How long a setting takes.
+fn time(ready: &mut Ready, way: &[Stop], timed_s: f64, found: &mut Measured) -> Result<(), Error> {
+    let Ready { engine, shape, .. } = ready;
     let mut of_stage = vec![Vec::new(); N_STAGES];
     let mut drawn = Vec::new();
-    let mut rounds = Rounds::new(course.targets.len(), timed_s);
+    let mut rounds = Rounds::new(way.len(), timed_s);
     while rounds.begins_another() {
         if interrupt::is_requested() {
             return Err(Error::Interrupted);
         }
         engine.reset();
-        for (k, (target, wrench)) in course.targets.iter().zip(&contact_wrench).enumerate() {
+        let mut before = found.wrench.iter();
+        for (k, stop) in way.iter().enumerate() {
             let begun = Instant::now();
-            let report = engine.step(target);
+            let report = engine.step(&stop.target);
             let stepped = begun.elapsed();
             shape.update(engine)?;
             let all = begun.elapsed();
-            debug_assert_eq!(report.contact_wrench_on_tool, *wrench, "rounds are alike");
             rounds.spent_s += all.as_secs_f64();
+            if stop.place.is_some() {
+                let wrench = Some(&report.contact_wrench_on_tool);
+                debug_assert_eq!(before.next(), wrench, "rounds are alike");
+            }
             if report.contacts == 0 {
                 continue;
             }
@@ -347,7 +327,7 @@ pub(super) fn measure(
     found.step = Times::of_ns(rounds.all());
     found.shape = Times::of_ns(drawn.into_iter());
     found.repeats = rounds.repeats();
-    Ok(found)
+    Ok(())
 }
 
 /// Edges between candidates, as candidates from one vertex to the other.

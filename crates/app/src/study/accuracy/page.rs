@@ -105,8 +105,11 @@ fn draw(
             Some((row, cost, error_of(errors).max(LEAST_ERROR)))
         })
         .collect();
-    let costs: Vec<(f64, f64)> = all.iter().map(|(_, cost, e)| (cost[1], *e)).collect();
-    let front = pareto_front(&costs);
+    let candidates = (0..all.len()).filter(|k| all[*k].0.can_be_on_front());
+    let candidates: Vec<usize> = candidates.collect();
+    let costs = candidates.iter().map(|&k| (all[k].1[1], all[k].2));
+    let front = pareto_front(&costs.collect::<Vec<_>>());
+    let front: Vec<usize> = front.into_iter().map(|k| candidates[k]).collect();
     // The scene's own setting is on most axes: it is named once.
     let first_own = all.iter().position(|(row, ..)| row.is_own);
     let points: Vec<PlotPoint> = all
@@ -146,6 +149,7 @@ fn to_json(study: &Study) -> String {
                 "axis": row.axis.name(),
                 "setting": row.label,
                 "own": row.is_own,
+                "increment_m": row.increment,
             });
             match &row.outcome {
                 Ok((m, e)) => {
@@ -170,6 +174,7 @@ fn to_json(study: &Study) -> String {
         "made": study.origin.made,
         "input_hash": study.origin.hash(),
         "machine": study.machine,
+        "law": study.law,
         "load": study.load,
         "busy": study.busy(),
         "gpu": study.adapter,
@@ -188,24 +193,46 @@ fn to_json(study: &Study) -> String {
     text
 }
 
-const HEAD: &str = "<tr><th>setting</th><th>step, 50 % (µs)</th><th>step, 99.9 % (µs)</th>\
-    <th>shape (µs)</th><th>preparing</th><th>memory</th><th>wrench</th><th>solver</th><th>peak</th>\
-    <th>shift of the peak (mm)</th><th>shape</th><th>energy</th><th>depth (µm)</th></tr>";
+/// `energy`: the column of energy or work.
+fn head_of_table(energy: &str) -> String {
+    format!(
+        "<tr><th>setting</th><th>step, 50 % (µs)</th><th>step, 99.9 % (µs)</th>\
+         <th>shape (µs)</th><th>preparing</th><th>memory</th><th>wrench</th><th>solver</th><th>peak</th>\
+         <th>shift of the peak (mm)</th><th>shape</th><th>{energy}</th><th>depth (µm)</th></tr>"
+    )
+}
 
-const HOW_TO_READ: &str = "<ul>\
-<li><b>wrench</b>: distance of force and torque from the reference along the whole path, root of the \
-mean square, as a share of the reference's. <b>solver</b>: the same against the exact solution on the \
-same mesh. <b>peak</b>: of the force at which it snaps (the largest peak that is passed, not what \
-it meets at the end), with its sign; of the largest force where nothing snaps; a dash where only one of setting and \
-reference snaps. \
-<b>shape</b>: of the drawn displacement where the part can touch; a dash where the mesh has other \
-nodes. <b>energy</b>: in the energy norm at the reference's highest energy. <b>depth</b>: how deep \
-a node, or a point on an edge between nodes, is inside the tool at most.</li>\
-<li>Errors below the reference's own are no differences.</li>\
-<li><b>not timed</b>: no step with contact was timed, so nothing is said of its time.</li>\
-<li>Only steps with contact are counted, the whole step without the drawn shape, which a session \
-makes 60 times a second. No slow step is left out.</li>\
-<li>The orange band is the front: settings that no other beats in both time and error.</li></ul>";
+fn how_to_read(study: &Study) -> String {
+    let energy = match study.law.has_friction {
+        false => "<b>energy</b>: in the energy norm at the reference's highest energy.",
+        true => {
+            "<b>work</b>: put in on the way to where the reference's is largest, which is what it takes to push the body \
+             over; with friction no energy is least at the solution, and its difference measures nothing."
+        }
+    };
+    let solver = match study.law.has_friction {
+        false => "same mesh.",
+        true => {
+            "same mesh in the finest increments. Increments are compared at the places that both come to."
+        }
+    };
+    format!(
+        "<ul>\
+         <li><b>wrench</b>: distance of force and torque from the reference along the whole path, root of the \
+         mean square, as a share of the reference's. <b>solver</b>: the same against the exact solution on the \
+         {solver} <b>peak</b>: of the force at which it snaps (the largest peak that is passed, not what \
+         it meets at the end), with its sign; of the largest force where nothing snaps; a dash where only one of setting \
+         and reference snaps. \
+         <b>shape</b>: of the drawn displacement where the part can touch; a dash where the mesh has other \
+         nodes. {energy} <b>depth</b>: how deep \
+         a node, or a point on an edge between nodes, is inside the tool at most.</li>\
+         <li>Errors below the reference's own are no differences.</li>\
+         <li><b>not timed</b>: no step with contact was timed, so nothing is said of its time.</li>\
+         <li>Only steps with contact are counted, the whole step without the drawn shape, which a session \
+         makes 60 times a second. No slow step is left out.</li>\
+         <li>The orange band is the front: settings that no other beats in both time and error.</li></ul>"
+    )
+}
 
 fn page(study: &Study, plots: [&String; 4], curves: &str) -> String {
     let mut page = String::new();
@@ -224,64 +251,82 @@ fn page(study: &Study, plots: [&String; 4], curves: &str) -> String {
     let _ = writeln!(
         page,
         "<p>Reference: {}; {} (travel of the held body). Its own error is {}: {}. The scene's own settings: \
-         {}.</p>",
+         {}.</p><p>Law of contact: {}.</p>",
         escaped(&study.reference.made),
         study.peak_words(),
         study.reference.bar.map_or("unknown".to_owned(), percent),
         escaped(&study.reference.bar_made),
         escaped(&study.own),
+        escaped(&study.law.words),
     );
     if let Some(busy) = study.busy() {
         let _ = writeln!(page, "<p class=\"warning\">{}</p>", escaped(&busy));
     }
+    figures(&mut page, study, plots, curves);
+    let _ = writeln!(page, "<h2>Tables</h2>");
+    tables(&mut page, study);
+    remarks(&mut page, study);
+    let _ = writeln!(page, "<h2>How to read this</h2>{}", how_to_read(study));
+    head::close(&mut page, &study.machine);
+    page
+}
+
+fn figures(page: &mut String, study: &Study, plots: [&String; 4], curves: &str) {
     let untimed: Vec<String> = study
         .distinct()
         .iter()
         .filter(|(_, m, _)| m.step.is_none())
         .map(|(row, ..)| name(row))
         .collect();
-    let figure = |page: &mut String, svg: &str, caption: &str| {
+    let mut figure = |title: &str, svg: &str, caption: &str| {
+        if !title.is_empty() {
+            let _ = writeln!(page, "<h2>{title}</h2>");
+        }
         let _ = writeln!(
             page,
             "<figure class=\"plot\"><div class=\"scroll wordy\">{svg}</div><figcaption>{}</figcaption></figure>",
             escaped(caption)
         );
     };
-    let _ = writeln!(page, "<h2>Error against time</h2>");
+    let not_shown = if untimed.is_empty() {
+        String::new()
+    } else {
+        format!(" Not timed, so not shown: {}.", untimed.join(", "))
+    };
     figure(
-        &mut page,
+        "Error against time",
         plots[0],
         &format!(
-            "One line for each choice; each point is the scene's own setting with that one changed.{}",
-            if untimed.is_empty() {
-                String::new()
-            } else {
-                format!(" Not timed, so not shown: {}.", untimed.join(", "))
-            }
+            "One line for each choice; each point is the scene's own setting with that one changed.{not_shown}"
         ),
     );
-    let _ = writeln!(page, "<h2>What the solver adds</h2>");
+    let adds = match study.law.has_friction {
+        false => "passes, tolerances and the p-method add",
+        true => "increments, passes, tolerances and the p-method add",
+    };
     figure(
-        &mut page,
+        "What the solver adds",
         plots[3],
-        "The same times, but errors against the exact solution on the same mesh at the same order: what \
-         passes, tolerances and the p-method add to the error of the mesh. Points at the bottom are \
-         round-off.",
+        &format!(
+            "The same times, but errors against the exact solution on the same mesh at the same order: what {adds} to the \
+             error of the mesh. Points at the bottom are round-off."
+        ),
     );
-    let _ = writeln!(page, "<h2>The curves behind it</h2>");
-    figure(&mut page, curves, &curves_caption(study));
-    let _ = writeln!(page, "<h2>Error against memory and preparing</h2>");
+    figure("The curves behind it", curves, &curves_caption(study));
     figure(
-        &mut page,
+        "Error against memory and preparing",
         plots[1],
         "Compliance that the step and the drawn shape read.",
     );
     figure(
-        &mut page,
+        "",
         plots[2],
         "Preparing the part once; it is cached after that.",
     );
-    let _ = writeln!(page, "<h2>Tables</h2>");
+}
+
+fn tables(page: &mut String, study: &Study) {
+    let head = head_of_table(study.law.energy());
     for axis in Axis::ALL {
         let rows: Vec<&Row> = study.rows.iter().filter(|r| r.axis == axis).collect();
         if rows.is_empty() {
@@ -289,7 +334,7 @@ fn page(study: &Study, plots: [&String; 4], curves: &str) -> String {
         }
         let _ = writeln!(
             page,
-            "<h3>{}</h3><div class=\"scroll\"><table class=\"numbers\">{HEAD}",
+            "<h3>{}</h3><div class=\"scroll\"><table class=\"numbers\">{head}",
             escaped(axis.title())
         );
         for row in rows {
@@ -314,9 +359,18 @@ fn page(study: &Study, plots: [&String; 4], curves: &str) -> String {
         }
         page.push_str("</table></div>\n");
     }
+}
+
+/// What is not there, and where the own setting's time goes.
+fn remarks(page: &mut String, study: &Study) {
     let _ = writeln!(page, "<ul>");
     for (what, why) in &study.not_there {
-        let _ = writeln!(page, "<li>{what}: no choice, {}.</li>", escaped(why));
+        let _ = writeln!(
+            page,
+            "<li>{}: no choice, {}.</li>",
+            escaped(what),
+            escaped(why)
+        );
     }
     if let Some(adapter) = &study.adapter {
         let _ = writeln!(page, "<li>The GPU: {}.</li>", escaped(adapter));
@@ -339,9 +393,7 @@ fn page(study: &Study, plots: [&String; 4], curves: &str) -> String {
             list.join(", ")
         );
     }
-    let _ = writeln!(page, "</ul><h2>How to read this</h2>{HOW_TO_READ}");
-    head::close(&mut page, &study.machine);
-    page
+    let _ = writeln!(page, "</ul>");
 }
 
 fn curves_caption(study: &Study) -> String {

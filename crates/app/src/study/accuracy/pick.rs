@@ -2,7 +2,9 @@
 
 use super::busy::Repeats;
 use super::compare::{Scales, distance};
-use super::measure::{Course, Samples, measure, ready};
+use super::course::Course;
+use super::law;
+use super::measure::{Samples, measure, ready};
 use super::point::{Setting, base, set_accuracy, set_order};
 use crate::Error;
 use crate::prepare::PrepareOptions;
@@ -54,8 +56,10 @@ pub fn resolved(
     let Some(budget) = scene.accuracy.budget_us else {
         return Ok((scene, None));
     };
-    let ladder = ladder(&scene);
-    let course = Course::of(&scene);
+    // Steps are those of the scene's run: with friction where it has some.
+    let (with_law, _) = law::decided(&scene, options, ui)?;
+    let ladder = ladder(&with_law);
+    let course = Course::of(&with_law);
     let (mut rungs, mut paths) = (Vec::new(), Vec::new());
     let (mut samples, mut lever) = (None, 1.0);
     let mut kept = Vec::new();
@@ -70,7 +74,7 @@ pub fn resolved(
         };
         lever = part_extent(&ready.prepared.loaded.mesh);
         let samples = samples.get_or_insert_with(|| Samples::of(&ready.prepared));
-        let found = measure(&mut ready, &setting.scene, &course, samples, Some(TIMED_S))?;
+        let found = measure(&mut ready, &setting, &course, samples, Some(TIMED_S))?;
         rungs.push(Rung {
             name,
             times_us: found.step.map(|t| (t.p50, t.p999)),
@@ -82,17 +86,14 @@ pub fn resolved(
         kept.push(setting);
     }
     ui.end_status();
-    let scales = Scales {
-        direction: scene.drive.direction.to_array(),
-        lever,
-        travel: scene.drive.travel,
-    };
+    let scales = Scales::of(&with_law, lever);
     for (rung, path) in rungs.iter_mut().zip(&paths) {
         rung.error = distance(path, &paths[0], &scales);
     }
     let picked = pick(&rungs, budget)
         .map_err(|why| Error::Input(format!("{}: {why}", scene.path.display())))?;
     let mut chosen = kept[picked.rung].scene.clone();
+    chosen.effects = scene.effects;
     chosen.accuracy.budget_us = None;
     chosen.accuracy.multiply = scene.accuracy.multiply;
     chosen.accuracy.scalar = MultiplyScalar::Auto;

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::course::{Course, Increment};
 use crate::choice::SOFTWARE;
 use crate::report::plot::short;
 use crate::scene::{
@@ -22,6 +23,8 @@ pub enum Axis {
     Contact,
     /// Passes over the contact planes.
     Planes,
+    /// Way between two steps, where there is friction.
+    Increments,
     /// Which interface nodes are free, forces of the full order.
     Select,
     /// Planes kept in a step.
@@ -40,12 +43,13 @@ pub enum Axis {
 
 impl Axis {
     /// All, in the order of the tables.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Order,
         Self::Interior,
         Self::Mesh,
         Self::Contact,
         Self::Planes,
+        Self::Increments,
         Self::Select,
         Self::MaxContacts,
         Self::Rates,
@@ -63,6 +67,7 @@ impl Axis {
             Self::Mesh => "mesh",
             Self::Contact => "contact",
             Self::Planes => "planes",
+            Self::Increments => "increments",
             Self::Select => "select",
             Self::MaxContacts => "contacts",
             Self::Rates => "rates",
@@ -81,6 +86,7 @@ impl Axis {
             Self::Mesh => "mesh",
             Self::Contact => "contact at nodes or at places that move",
             Self::Planes => "passes over the contact planes",
+            Self::Increments => "size of the increments (way between two steps)",
             Self::Select => "p-method: select (free nodes drawn)",
             Self::MaxContacts => "contacts kept",
             Self::Rates => "two rates (frozen problems in the loop)",
@@ -89,6 +95,12 @@ impl Axis {
             Self::Quadrature => "quadrature",
             Self::Preset => "preset",
         }
+    }
+
+    /// Whether its settings trade the accuracy of a step for its time. What is drawn is no part of a step, and smaller
+    /// increments are more steps, not longer ones: between those, differences in time are the clock's.
+    pub(super) fn is_choice_of_step(self) -> bool {
+        !matches!(self, Self::Scalar | Self::Increments)
     }
 
     /// The axis of this name.
@@ -104,6 +116,8 @@ pub struct Setting {
     pub scene: Scene,
     /// How often its mesh is refined.
     pub refinements: u8,
+    /// In which it is driven.
+    pub increment: Increment,
     /// Name of the graphics adapter that multiplies, if one does.
     pub adapter: Option<String>,
 }
@@ -120,8 +134,12 @@ impl Setting {
             Some(adapter) if accuracy.multiply == Multiply::Gpu => format!(" on {adapter}"),
             _ => String::new(),
         };
+        let in_steps = match self.increment {
+            Increment::OWN => String::new(),
+            other => format!(" {other:?}"),
+        };
         format!(
-            "{} refined {} order {:?} inside {:?} {:?} {accuracy:?}{on_adapter}",
+            "{} refined {} order {:?} inside {:?} {:?} {accuracy:?}{on_adapter}{in_steps}",
             self.scene.part.mesh.display(),
             self.refinements,
             self.scene.part.order,
@@ -162,6 +180,7 @@ pub(super) fn base(scene: &Scene, adapter: Option<&str>) -> Setting {
     Setting {
         scene: scene.clone(),
         refinements: 0,
+        increment: Increment::OWN,
         adapter: adapter.map(str::to_owned),
     }
 }
@@ -187,147 +206,108 @@ pub(super) fn set_order(scene: &mut Scene, order: u8) {
     scene.part.interior_order = None;
 }
 
-/// All points of the axes asked for. `own_order`: that of the mesh; `extent`: size of the part, m; `adapter`: see
-/// [`base`].
-pub(super) fn points(
-    scene: &Scene,
-    axes: &[Axis],
-    own_order: u8,
-    extent: f64,
-    adapter: Option<&str>,
-) -> Vec<Point> {
-    let mut all = Vec::new();
-    let own = scene.part.order.unwrap_or(own_order);
+/// What the points of a scene depend on, beside the scene.
+pub(super) struct Surroundings<'a> {
+    /// Order of the elements in the mesh file.
+    pub(super) own_order: u8,
+    /// Size of the part, m.
+    pub(super) extent: f64,
+    /// As of [`base`].
+    pub(super) adapter: Option<&'a str>,
+    /// The way on which they are compared.
+    pub(super) course: &'a Course,
+}
+
+/// All points of the axes asked for.
+pub(super) fn points(scene: &Scene, axes: &[Axis], around: &Surroundings<'_>) -> Vec<Point> {
+    let mut list = List {
+        scene,
+        around,
+        axis: Axis::Order,
+        points: Vec::new(),
+    };
     for &axis in axes {
-        let mut add = |label: String, change: &dyn Fn(&mut Setting)| {
-            let mut setting = base(scene, adapter);
-            setting.scene.accuracy.preset = None;
-            change(&mut setting);
-            all.push(Point {
-                axis,
-                label,
-                setting,
-            });
-        };
-        match axis {
+        list.axis = axis;
+        if !list.of_part() {
+            list.of_step();
+        }
+    }
+    list.points
+}
+
+/// Why a scene has no points of an axis; `None` if it has some, or if this is plain from its settings.
+pub(super) fn reason_for_none(axis: Axis, scene: &Scene) -> Option<&'static str> {
+    let has_friction = scene.effects.simulated_friction().is_some();
+    match axis {
+        Axis::Increments if !has_friction => {
+            Some("without friction the force at a place does not depend on the way to it")
+        }
+        Axis::Rates if has_friction => {
+            Some("friction is solved in whole steps, not in frozen problems")
+        }
+        _ => None,
+    }
+}
+
+struct List<'a> {
+    scene: &'a Scene,
+    around: &'a Surroundings<'a>,
+    /// Of what is added.
+    axis: Axis,
+    points: Vec<Point>,
+}
+
+impl List<'_> {
+    fn add(&mut self, label: impl Into<String>, change: impl FnOnce(&mut Setting)) {
+        let mut setting = base(self.scene, self.around.adapter);
+        setting.scene.accuracy.preset = None;
+        change(&mut setting);
+        self.points.push(Point {
+            axis: self.axis,
+            label: label.into(),
+            setting,
+        });
+    }
+
+    /// What changes the part, or all. Whether the axis is such a one.
+    fn of_part(&mut self) -> bool {
+        let part = &self.scene.part;
+        let own = part.order.unwrap_or(self.around.own_order);
+        match self.axis {
             Axis::Order => {
                 for order in 1..=3u8 {
-                    add(format!("order {order}"), &|s| {
-                        set_order(&mut s.scene, order);
-                    });
+                    self.add(format!("order {order}"), |s| set_order(&mut s.scene, order));
                 }
             }
             Axis::Interior => {
-                add(format!("order {own} throughout"), &|s| {
+                self.add(format!("order {own} throughout"), |s| {
                     s.scene.part.interior_order = None;
                 });
                 for order in (own + 1..=5).filter(|order| order.is_multiple_of(own)) {
-                    add(format!("order {order} inside"), &|s| {
+                    self.add(format!("order {order} inside"), |s| {
                         s.scene.part.interior_order = Some(order);
                     });
                 }
             }
             Axis::Mesh => {
-                add(name_of(&scene.part.mesh), &|_| {});
-                for mesh in &scene.part.other_meshes {
-                    add(name_of(mesh), &|s| s.scene.part.mesh.clone_from(mesh));
+                self.add(name_of(&part.mesh), |_| {});
+                for mesh in &part.other_meshes {
+                    self.add(name_of(mesh), |s| s.scene.part.mesh.clone_from(mesh));
                 }
-                let refined = format!("{}, each element in eight", name_of(&scene.part.mesh));
-                add(refined, &|s| s.refinements = 1);
-            }
-            Axis::Contact => {
-                for (label, at) in [("nodes", ContactAt::Nodes), ("places", ContactAt::Places)] {
-                    add(label.to_owned(), &|s| s.scene.accuracy.contact_at = at);
-                }
-            }
-            Axis::Planes => {
-                for times in [1, 2, 3, 5] {
-                    add(
-                        format!("{times} passes").replace("1 passes", "1 pass"),
-                        &|s| {
-                            s.scene.accuracy.contact_iterations = ContactIterations::Times(times);
-                        },
-                    );
-                }
-                add("converged".to_owned(), &|s| {
-                    s.scene.accuracy.contact_iterations = ContactIterations::Converged;
-                });
-            }
-            Axis::Select if own == 1 => {}
-            Axis::Select => {
-                let mut free = |label: String, free| {
-                    add(label, &|s| {
-                        s.scene.accuracy.adaptive = Adaptive::On(free);
-                    });
-                };
-                free("none free".to_owned(), FreeNodes::Radius(0.0));
-                for share in [0.05, 0.1] {
-                    let radius = rounded(share * extent);
-                    free(within(radius), FreeNodes::Radius(radius));
-                }
-                free("where bent by 0.1 %".to_owned(), FreeNodes::Indicator(1e-3));
-                add("all free".to_owned(), &|s| {
-                    s.scene.accuracy.adaptive = Adaptive::Off;
-                });
-            }
-            Axis::MaxContacts => {
-                for most in [8, 16, 32, 500] {
-                    add(format!("{most} planes"), &|s| {
-                        s.scene.accuracy.max_contacts = most;
-                    });
-                }
-            }
-            Axis::Rates => {
-                add("one rate".to_owned(), &|s| {
-                    s.scene.accuracy.rates = Rates::One;
-                });
-                for every in [2, 5, 10, 20] {
-                    add(format!("results {every} periods later"), &|s| {
-                        s.scene.accuracy.rates = Rates::Every(every);
-                    });
-                }
-            }
-            Axis::Scalar => {
-                let mut kept = |label: String, multiply, scalar| {
-                    add(label, &|s| {
-                        s.scene.accuracy.multiply = multiply;
-                        s.scene.accuracy.scalar = scalar;
-                    });
-                };
-                for (name, scalar) in [("f32", MultiplyScalar::F32), ("f64", MultiplyScalar::F64)] {
-                    kept(name.to_owned(), Multiply::Cpu, scalar);
-                }
-                if let Some(adapter) = adapter {
-                    let of = if adapter.ends_with(SOFTWARE) {
-                        format!("the GPU{SOFTWARE}")
-                    } else {
-                        "the GPU".to_owned()
-                    };
-                    for (name, scalar) in
-                        [("f16", MultiplyScalar::F16), ("f32", MultiplyScalar::F32)]
-                    {
-                        kept(format!("{name} on {of}"), Multiply::Gpu, scalar);
-                    }
-                }
-            }
-            Axis::ContactScalar => {
-                for (label, scalar) in [("f32", Scalar::F32), ("f64", Scalar::F64)] {
-                    add(label.to_owned(), &|s| {
-                        s.scene.accuracy.contact_scalar = scalar
-                    });
-                }
+                let refined = format!("{}, each element in eight", name_of(&part.mesh));
+                self.add(refined, |s| s.refinements = 1);
             }
             Axis::Quadrature => {
                 for (label, rule) in [
                     ("fast", QuadratureRule::Fast),
                     ("converged", QuadratureRule::Converged),
                 ] {
-                    add(label.to_owned(), &|s| s.scene.part.quadrature = rule);
+                    self.add(label, |s| s.scene.part.quadrature = rule);
                 }
             }
             Axis::Preset => {
                 for preset in [Preset::Fast, Preset::Balanced, Preset::Exact] {
-                    add(preset.name().to_owned(), &|s| {
+                    self.add(preset.name(), |s| {
                         set_accuracy(&mut s.scene, Accuracy::of(Some(preset)));
                         if preset == Preset::Exact {
                             set_order(&mut s.scene, 3);
@@ -335,9 +315,110 @@ pub(super) fn points(
                     });
                 }
             }
+            _ => return false,
+        }
+        true
+    }
+
+    /// What changes the step.
+    fn of_step(&mut self) {
+        let own = self.scene.part.order.unwrap_or(self.around.own_order);
+        match self.axis {
+            axis if reason_for_none(axis, self.scene).is_some() => {}
+            Axis::Contact => {
+                for (label, at) in [("nodes", ContactAt::Nodes), ("places", ContactAt::Places)] {
+                    self.add(label, |s| s.scene.accuracy.contact_at = at);
+                }
+            }
+            Axis::Planes => {
+                for times in [1, 2, 3, 5] {
+                    let label = format!("{times} passes").replace("1 passes", "1 pass");
+                    self.add(label, |s| {
+                        s.scene.accuracy.contact_iterations = ContactIterations::Times(times);
+                    });
+                }
+                self.add("converged", |s| {
+                    s.scene.accuracy.contact_iterations = ContactIterations::Converged;
+                });
+            }
+            Axis::Increments => self.increments(),
+            Axis::Select if own > 1 => self.free_nodes(),
+            Axis::MaxContacts => {
+                for most in [8, 16, 32, 500] {
+                    self.add(format!("{most} planes"), |s| {
+                        s.scene.accuracy.max_contacts = most;
+                    });
+                }
+            }
+            Axis::Rates => {
+                self.add("one rate", |s| s.scene.accuracy.rates = Rates::One);
+                for every in [2, 5, 10, 20] {
+                    self.add(format!("results {every} periods later"), |s| {
+                        s.scene.accuracy.rates = Rates::Every(every);
+                    });
+                }
+            }
+            Axis::Scalar => self.shapes(),
+            Axis::ContactScalar => {
+                for (label, scalar) in [("f32", Scalar::F32), ("f64", Scalar::F64)] {
+                    self.add(label, |s| s.scene.accuracy.contact_scalar = scalar);
+                }
+            }
+            _ => {}
         }
     }
-    all
+
+    fn increments(&mut self) {
+        let course = self.around.course;
+        for increment in Increment::COMPARED {
+            // A way of a few steps has no larger ones.
+            if increment == Increment::OWN || course.n_steps(increment) > 1 {
+                let n = course.n_steps(increment);
+                let label = format!("{}, {n} steps", length(course.length(increment)));
+                self.add(label, |s| s.increment = increment);
+            }
+        }
+    }
+
+    fn free_nodes(&mut self) {
+        let extent = self.around.extent;
+        let mut free = |label: String, free| {
+            self.add(label, |s| s.scene.accuracy.adaptive = Adaptive::On(free));
+        };
+        free("none free".to_owned(), FreeNodes::Radius(0.0));
+        for share in [0.05, 0.1] {
+            let radius = rounded(share * extent);
+            free(
+                format!("within {}", length(radius)),
+                FreeNodes::Radius(radius),
+            );
+        }
+        free("where bent by 0.1 %".to_owned(), FreeNodes::Indicator(1e-3));
+        self.add("all free", |s| s.scene.accuracy.adaptive = Adaptive::Off);
+    }
+
+    fn shapes(&mut self) {
+        let adapter = self.around.adapter;
+        let mut kept = |label: String, multiply, scalar| {
+            self.add(label, |s| {
+                s.scene.accuracy.multiply = multiply;
+                s.scene.accuracy.scalar = scalar;
+            });
+        };
+        for (name, scalar) in [("f32", MultiplyScalar::F32), ("f64", MultiplyScalar::F64)] {
+            kept(name.to_owned(), Multiply::Cpu, scalar);
+        }
+        if let Some(adapter) = adapter {
+            let of = if adapter.ends_with(SOFTWARE) {
+                format!("the GPU{SOFTWARE}")
+            } else {
+                "the GPU".to_owned()
+            };
+            for (name, scalar) in [("f16", MultiplyScalar::F16), ("f32", MultiplyScalar::F32)] {
+                kept(format!("{name} on {of}"), Multiply::Gpu, scalar);
+            }
+        }
+    }
 }
 
 /// Takes settings of accuracy over; what depends on the scene's size stays the scene's.
@@ -356,8 +437,8 @@ fn name_of(mesh: &Path) -> String {
         .map_or_else(String::new, |name| name.to_string_lossy().into_owned())
 }
 
-fn within(radius: f64) -> String {
-    format!("within {} mm", short(1e3 * radius))
+pub(super) fn length(metres: f64) -> String {
+    format!("{} mm", short(1e3 * metres))
 }
 
 /// To two digits: radii that are read easily.

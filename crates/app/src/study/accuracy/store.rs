@@ -22,7 +22,7 @@ const FORMAT: u32 = 3;
 const REFERENCE_FORMAT: u32 = 2;
 
 /// What a scene is, whatever its settings of accuracy: a hash of mesh, material, supports, contact,
-/// tool, path and coupling.
+/// tool, path, coupling and friction.
 ///
 /// # Errors
 /// A mesh that cannot be read.
@@ -60,6 +60,9 @@ pub(super) fn identity(scene: &Scene) -> Result<String, Error> {
         scene.coupling,
     );
     hash.update(rest.as_bytes());
+    if let Some(friction) = scene.effects.simulated_friction() {
+        hash.update(format!("{friction:?}").as_bytes());
+    }
     Ok(hash.finalize().to_hex()[..32].to_owned())
 }
 
@@ -196,7 +199,7 @@ pub(super) fn read_reference(
     file: &Path,
     scene: &Scene,
     identity: &str,
-    n_steps: usize,
+    n_places: usize,
 ) -> Result<Reference, Error> {
     let text = fs::read_to_string(file).map_err(Error::io(file, "read the reference"))?;
     let refuse = |what: String| Error::Input(format!("{}: {what}", file.display()));
@@ -214,13 +217,13 @@ pub(super) fn read_reference(
     if content.scene != identity {
         return Err(refuse(format!(
             "is the reference of another scene ({:?}, this one is {:?}): mesh, material, supports, tool, \
-             path or coupling differ; write one for this scene with --save-reference",
+             path, coupling or friction differ; write one for this scene with --save-reference",
             content.title, scene.title
         )));
     }
     let reference = content.reference;
-    let is_whole = reference.wrench.len() == n_steps
-        && reference.potential.len() == n_steps
+    let is_whole = reference.wrench.len() == n_places
+        && reference.potential.len() == n_places
         && reference
             .wrench
             .iter()
@@ -229,7 +232,7 @@ pub(super) fn read_reference(
             .all(|x| x.is_finite());
     if !is_whole {
         return Err(refuse(format!(
-            "should hold {n_steps} finite wrenches and energies; write it anew with --save-reference"
+            "should hold {n_places} finite wrenches and energies; write it anew with --save-reference"
         )));
     }
     Ok(reference)

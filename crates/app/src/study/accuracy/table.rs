@@ -11,6 +11,13 @@ use crate::report::plot::short;
 /// µs: the period of a haptic loop.
 pub(super) const PERIOD_US: f64 = 1000.0;
 
+impl Row {
+    /// Whether its error has its price in the costs that are plotted: smaller increments are more steps of the same cost.
+    pub(super) fn can_be_on_front(&self) -> bool {
+        self.is_own || self.axis != Axis::Increments
+    }
+}
+
 impl Study {
     /// The settings that ran, each once.
     pub(super) fn distinct(&self) -> Vec<(&Row, &Measured, &Errors)> {
@@ -28,8 +35,7 @@ impl Study {
     /// One sentence: the best setting under 1 ms, and what it gives up.
     pub fn sentence(&self) -> String {
         let mut all = self.distinct();
-        // What is drawn is no part of a step: differences between its settings are those of the clock.
-        all.retain(|(row, ..)| row.is_own || row.axis != Axis::Scalar);
+        all.retain(|(row, ..)| row.is_own || row.axis.is_choice_of_step());
         // What was not timed can be said nothing of.
         all.retain(|(_, m, _)| m.step.is_some());
         if all.is_empty() {
@@ -105,7 +111,12 @@ impl Study {
     /// Why there are no times.
     fn nothing_timed(&self) -> String {
         match self.distinct().first() {
-            None => "No setting could be run.".to_owned(),
+            None => match self.not_there.first() {
+                Some((what, why)) if self.rows.is_empty() => {
+                    format!("Nothing is compared: {what} is no choice here, {why}.")
+                }
+                _ => "No setting could be run.".to_owned(),
+            },
             Some(_) => "No setting was timed, because no step of the path has contact: let the tool reach the part."
                 .to_owned(),
         }
@@ -155,10 +166,13 @@ pub(super) fn percent(share: f64) -> String {
     format!("{} %", short(value))
 }
 
-const COLUMNS: [&str; 12] = [
-    "p50 us", "p99.9 us", "shape us", "prepare", "memory", "wrench", "solver", "peak", "shift mm",
-    "shape", "energy", "depth um",
-];
+fn columns(study: &Study) -> [&'static str; 12] {
+    let energy = study.law.energy();
+    [
+        "p50 us", "p99.9 us", "shape us", "prepare", "memory", "wrench", "solver", "peak",
+        "shift mm", "shape", energy, "depth um",
+    ]
+}
 
 /// Cells of a line: times, costs, errors.
 pub(super) fn cells(measured: &Measured, errors: &Errors) -> [String; 12] {
@@ -175,7 +189,10 @@ pub(super) fn cells(measured: &Measured, errors: &Errors) -> [String; 12] {
             .peak_travel
             .map_or("-".to_owned(), |shift| short(1e3 * shift)),
         errors.displacement.map_or("-".to_owned(), percent),
-        percent(errors.energy),
+        errors
+            .energy
+            .or(errors.work)
+            .map_or("-".to_owned(), percent),
         match 1e6 * measured.penetration {
             depth if depth < 1e-3 => "below 1e-3".to_owned(),
             depth => short(depth),
@@ -187,6 +204,7 @@ pub(super) fn cells(measured: &Measured, errors: &Errors) -> [String; 12] {
 pub fn text(study: &Study) -> String {
     let mut out = format!("{}\n{}\n", study.title, study.machine);
     let _ = writeln!(out, "own settings: {}", study.own);
+    let _ = writeln!(out, "law of contact: {}", study.law.words);
     let _ = writeln!(out, "reference: {}", study.reference.made);
     let _ = writeln!(
         out,
@@ -200,7 +218,7 @@ pub fn text(study: &Study) -> String {
     }
     out.push('\n');
     let _ = write!(out, "{:<34}", "");
-    for column in COLUMNS {
+    for column in columns(study) {
         let _ = write!(out, "{column:>11}");
     }
     out.push('\n');
@@ -247,9 +265,11 @@ pub(super) fn csv(study: &Study) -> String {
     }
     out.push_str(
         ",prepare_s,bytes,wrench_l2_rel,solver_l2_rel,wrench_max_rel,peak_rel,peak_travel_m,displacement_rel,\
-         energy_rel,penetration_m,certificate,steps_not_converged,front,repeat_over_shortest,disturbed_share\n",
+         energy_rel,work_rel,penetration_m,certificate,steps_not_converged,front,repeat_over_shortest,disturbed_share,\
+         increment_m\n",
     );
-    let all = study.distinct();
+    let mut all = study.distinct();
+    all.retain(|(row, ..)| row.can_be_on_front());
     let costs: Vec<(f64, f64)> = all.iter().map(|(_, m, e)| (p999(m), e.wrench_l2)).collect();
     let is_timed = |k: &usize| all[*k].1.step.is_some();
     let front = pareto_front(&costs).into_iter().filter(is_timed);
@@ -286,7 +306,7 @@ pub(super) fn csv(study: &Study) -> String {
                 let is_front = front.iter().any(|r| std::ptr::eq(*r, row));
                 let _ = writeln!(
                     out,
-                    ",{},{},{},{},{},{},{},{},{},{},{},{},{is_front},{},{}",
+                    ",{},{},{},{},{},{},{},{},{},{},{},{},{},{is_front},{},{},{}",
                     m.prepare_s,
                     m.bytes,
                     e.wrench_l2,
@@ -295,12 +315,14 @@ pub(super) fn csv(study: &Study) -> String {
                     optional(e.peak),
                     optional(e.peak_travel),
                     optional(e.displacement),
-                    e.energy,
+                    optional(e.energy),
+                    optional(e.work),
                     m.penetration,
                     m.certificate,
                     m.not_converged,
                     optional(m.repeats.map(|r| r.typical)),
                     optional(m.repeats.map(|r| r.disturbed)),
+                    row.increment,
                 );
             }
         }

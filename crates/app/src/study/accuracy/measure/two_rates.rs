@@ -5,9 +5,8 @@ use std::time::Instant;
 use device::Wrench;
 
 use super::penetration;
-use super::{Course, Measured, Ready, Rounds, Times, contact_edges, displaced};
+use super::{Course, Measured, Ready, Rounds, Setting, Stop, Times, contact_edges, displaced};
 use crate::engine::{Stage, StepReport};
-use crate::scene::Scene;
 use crate::session::fast::FastSettings;
 use crate::session::part_extent;
 use crate::session::slow::Stepped;
@@ -17,7 +16,7 @@ use crate::{Error, interrupt};
 /// step, at other moments than those of the reference: it is not compared.
 pub(super) fn measure(
     ready: &mut Ready,
-    scene: &Scene,
+    setting: &Setting,
     course: &Course,
     every: u64,
     timed_s: f64,
@@ -27,17 +26,18 @@ pub(super) fn measure(
         engine,
         shape,
     } = ready;
+    let way = course.way(setting.increment);
     let settings = FastSettings {
-        period_s: scene.device.servo_period,
+        period_s: setting.scene.device.servo_period,
         force_resolution: device::Limits::virtuose_6d().force_resolution,
         lever: part_extent(&prepared.loaded.mesh),
-        n_ticks: course.targets.len(),
+        n_ticks: way.len(),
     };
     let edges = contact_edges(prepared);
     let moments = course.moments();
-    let mut found = Measured::nothing_yet(prepared, course.targets.len());
+    let mut found = Measured::nothing_yet(prepared, course.n_places());
     let mut drawn = Vec::new();
-    let mut rounds = Rounds::new(course.targets.len(), timed_s);
+    let mut rounds = Rounds::new(way.len(), timed_s);
     // The first round is for what is computed; it also warms up, and takes nothing from the time of the others.
     let mut is_timed = false;
     while !is_timed || rounds.begins_another() {
@@ -45,8 +45,8 @@ pub(super) fn measure(
             return Err(Error::Interrupted);
         }
         engine.reset();
-        let mut stepped = Stepped::new(engine, &course.targets[0], every, settings)?;
-        for (k, target) in course.targets.iter().enumerate() {
+        let mut stepped = Stepped::new(engine, &way[0].target, every, settings)?;
+        for (k, Stop { target, place }) in way.iter().enumerate() {
             let begun = Instant::now();
             let answer = stepped.tick(k as u64, target, on_tool);
             let tick = begun.elapsed();
@@ -63,6 +63,12 @@ pub(super) fn measure(
                 continue;
             }
             let report = &answer.report;
+            found.contacts = found.contacts.max(report.contacts);
+            found.not_converged += usize::from(!report.converged);
+            found.certificate = found.certificate.max(report.certificate);
+            let Some(place) = place else {
+                continue;
+            };
             let contacts = stepped.fast().active_contacts();
             let part = engine.part();
             let displacement = |i: usize| part.displacement(i, contacts);
@@ -74,10 +80,7 @@ pub(super) fn measure(
             let energy = of_guide + of_part.sum::<f64>();
             found.potential.push(energy);
             found.wrench.push(answer.wrench_on_handle.to_array());
-            found.contacts = found.contacts.max(report.contacts);
-            found.not_converged += usize::from(!report.converged);
-            found.certificate = found.certificate.max(report.certificate);
-            if moments.contains(&k) {
+            if moments.contains(place) {
                 let places = displaced(part.rest_positions(), displacement);
                 let deepest = penetration(engine.tool(), &places, &report.tool_pose, &edges);
                 found.penetration = found.penetration.max(deepest);

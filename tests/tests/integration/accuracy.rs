@@ -182,13 +182,14 @@ fn the_study_with_friction_has_it_in_the_reference_too_and_increments_are_of_fir
     assert!((12.5..14.0).contains(&peak), "{peak} N");
     assert!(number(&study["reference"]["bar"]) < 0.2);
 
-    let all = rows(&study);
-    assert_eq!(all.len(), 5, "two rates are no choice with friction");
-    assert!(
-        outcome
-            .out
-            .contains("no choice, friction is solved in whole steps")
-    );
+    let (all, rates): (Vec<Value>, Vec<Value>) = rows(&study)
+        .into_iter()
+        .partition(|row| row["axis"] == "increments");
+    assert_eq!((all.len(), rates.len()), (5, 5), "{}", outcome.out);
+    // Results that are up to 20 periods late leave the loop's own increments, of a period each.
+    for row in &rates {
+        assert!(number(&row["errors"]["solver_l2"]) < 5e-4, "{row}");
+    }
     let increments: Vec<f64> = all.iter().map(|row| number(&row["increment_m"])).collect();
     for (found, expected) in increments.iter().zip([5e-6, 1e-5, 2e-5, 4e-5, 8e-5]) {
         assert!((found / expected - 1.0).abs() < 1e-12, "{increments:?}");
@@ -240,7 +241,7 @@ fn the_study_with_friction_has_it_in_the_reference_too_and_increments_are_of_fir
 }
 
 #[test]
-fn without_friction_there_are_no_increments_to_choose_and_with_it_no_two_rates() {
+fn without_friction_there_are_no_increments_to_choose() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("study");
     // Called for from 0.035 on.
@@ -262,15 +263,6 @@ fn without_friction_there_are_no_increments_to_choose_and_with_it_no_two_rates()
         sentence.contains("without friction the force at a place does not depend"),
         "{sentence}"
     );
-
-    let scene = short_clip(
-        dir.path(),
-        "friction_coefficient = 0.2\n[accuracy]\nrates = { every = 5 }",
-    );
-    let refused = accuracy(&scene, &out, &[]);
-    assert_eq!(refused.code, 2, "{}", refused.err);
-    let told = "clip.toml: accuracy.rates asks for two rates, and the scene for friction";
-    assert!(refused.err.contains(told), "{}", refused.err);
 }
 
 fn rows(study: &Value) -> Vec<Value> {

@@ -7,7 +7,7 @@ use super::point::length;
 use crate::prepare::{PrepareOptions, prepare};
 use crate::progress::Ui;
 use crate::report::plot::short;
-use crate::scene::{EffectChoice, Rates, Scene};
+use crate::scene::{EffectChoice, Scene};
 use crate::{Error, drive, setup};
 
 /// The law of contact of a study: that of the scene's own run.
@@ -22,20 +22,13 @@ pub struct Law {
 /// The scene with friction on or off, as a run of it decides, by its own curve without friction where that is left open.
 ///
 /// # Errors
-/// As preparing and driving; two rates with friction; Ctrl-C.
+/// As preparing and driving; Ctrl-C.
 pub(super) fn decided(
     scene: &Scene,
     options: &PrepareOptions,
     ui: &Ui<'_>,
 ) -> Result<(Scene, Law), Error> {
     let has_friction = calls_for_friction(scene, options, ui)?;
-    if has_friction && matches!(scene.accuracy.rates, Rates::Every(_)) {
-        return Err(Error::Input(format!(
-            "{}: accuracy.rates asks for two rates, and the scene for friction, which is solved in whole steps only; \
-             write accuracy.rates = \"one\", or effects.friction = \"off\"",
-            scene.path.display()
-        )));
-    }
     let words = words(scene, has_friction);
     let law = Law {
         has_friction,

@@ -242,9 +242,6 @@ pub(super) fn reason_for_none(axis: Axis, scene: &Scene) -> Option<&'static str>
         Axis::Increments if !has_friction => {
             Some("without friction the force at a place does not depend on the way to it")
         }
-        Axis::Rates if has_friction => {
-            Some("friction is solved in whole steps, not in frozen problems")
-        }
         _ => None,
     }
 }

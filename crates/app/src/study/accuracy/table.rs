@@ -8,6 +8,21 @@ use crate::engine::Stage;
 use crate::prepare::budget::{bytes, duration};
 use crate::report::plot::short;
 
+/// Times the least error: what is within it is as accurate.
+const SAME_ERROR: f64 = 1.001;
+
+type Line<'a> = (&'a Row, &'a Measured, &'a Errors);
+
+/// The most accurate one; of those that are as accurate, the fastest.
+fn best_of<'a>(among: &[&Line<'a>]) -> Option<Line<'a>> {
+    let errors = among.iter().map(|(.., e)| e.wrench_l2);
+    let most = SAME_ERROR * errors.fold(f64::INFINITY, f64::min) + 1e-6;
+    let p50 = |m: &Measured| m.step.map_or(f64::INFINITY, |t| t.p50);
+    let same = among.iter().filter(|(.., e)| e.wrench_l2 <= most);
+    same.min_by(|a, b| p50(a.1).total_cmp(&p50(b.1)))
+        .map(|line| **line)
+}
+
 /// µs: the period of a haptic loop.
 pub(super) const PERIOD_US: f64 = 1000.0;
 
@@ -42,15 +57,8 @@ impl Study {
             return self.nothing_timed();
         }
         let fits = |m: &Measured| p999(m) < PERIOD_US;
-        let by_error = |a: &&(&Row, &Measured, &Errors), b: &&(&Row, &Measured, &Errors)| {
-            // Equal errors: the faster one.
-            let same = (a.2.wrench_l2 - b.2.wrench_l2).abs() <= 1e-6;
-            let by_error = a.2.wrench_l2.total_cmp(&b.2.wrench_l2);
-            let p50 = |m: &Measured| m.step.map_or(f64::INFINITY, |t| t.p50);
-            let by_time = p50(a.1).total_cmp(&p50(b.1));
-            if same { by_time } else { by_error }
-        };
-        let best = all.iter().filter(|(_, m, _)| fits(m)).min_by(by_error);
+        let (fitting, others): (Vec<_>, Vec<_>) = all.iter().partition(|(_, m, _)| fits(m));
+        let best = best_of(&fitting);
         let Some((row, measured, errors)) = best else {
             let fastest = all.iter().min_by(|a, b| p999(a.1).total_cmp(&p999(b.1)));
             return fastest.map_or("No setting could be run.".to_owned(), |(row, m, _)| {
@@ -63,10 +71,11 @@ impl Study {
                 )
             });
         };
-        let better = all
-            .iter()
-            .filter(|(_, m, e)| !fits(m) && e.wrench_l2 < errors.wrench_l2)
-            .min_by(by_error);
+        let better: Vec<_> = others
+            .into_iter()
+            .filter(|(.., e)| e.wrench_l2 < errors.wrench_l2)
+            .collect();
+        let better = best_of(&better);
         let gives_up = match better {
             Some((other, m, e)) if e.wrench_l2 == 0.0 => format!(
                 "; {}, the reference itself, needs {} µs",

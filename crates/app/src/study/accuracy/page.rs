@@ -213,7 +213,9 @@ fn how_to_read(study: &Study) -> String {
     let solver = match study.law.has_friction {
         false => "same mesh.",
         true => {
-            "same mesh in the finest increments. Increments are compared at the places that both come to."
+            "same mesh in increments of a sixteenth of the scene's own. With friction all settings are compared at the \
+             places that the largest increments come to; larger ones than the scene's own may pass over the peak, so that \
+             theirs is a dash."
         }
     };
     format!(
@@ -300,16 +302,19 @@ fn figures(page: &mut String, study: &Study, plots: [&String; 4], curves: &str) 
             "One line for each choice; each point is the scene's own setting with that one changed.{not_shown}"
         ),
     );
-    let adds = match study.law.has_friction {
-        false => "passes, tolerances and the p-method add",
-        true => "increments, passes, tolerances and the p-method add",
+    let (adds, bottom) = match study.law.has_friction {
+        false => (
+            "passes, tolerances and the p-method add",
+            " Points at the bottom are round-off.",
+        ),
+        true => ("increments, passes, tolerances and the p-method add", ""),
     };
     figure(
         "What the solver adds",
         plots[3],
         &format!(
             "The same times, but errors against the exact solution on the same mesh at the same order: what {adds} to the \
-             error of the mesh. Points at the bottom are round-off."
+             error of the mesh.{bottom}"
         ),
     );
     figure("The curves behind it", curves, &curves_caption(study));

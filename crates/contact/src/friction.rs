@@ -35,8 +35,8 @@
 //! force along it, and sticks if it does not move along it either. One that no force moves at all is without force; if it
 //! overlaps there is no solution, and the certificate says so.
 //!
-//! The answer is unique for small coefficients. For large ones there may be none, or several, as when a part wedges: then
-//! the answer is the best seen and [`Status::Budget`] says so.
+//! The answer is unique for small coefficients. For large ones there may be several, as when a part wedges, and one of them is
+//! given: [`others`] looks for more. Where there is none, the best seen is given and [`Status::Budget`] says so.
 //!
 //! ```
 //! use contact::friction::{Problem, Scratch, Settings, State, Status, solve};
@@ -67,6 +67,7 @@ mod cone;
 mod contacts;
 mod local;
 mod newton;
+mod others;
 mod pivots;
 mod problem;
 mod run;
@@ -75,6 +76,7 @@ use std::time::Instant;
 
 pub use certificate::{Certificate, check};
 pub use coefficients::Coefficients;
+pub use others::{may_have_others, others};
 pub use problem::Problem;
 
 use crate::error::Error;

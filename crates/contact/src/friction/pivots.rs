@@ -10,9 +10,6 @@ use super::newton;
 use super::run::{Best, GOAL, Run};
 use super::{Scratch, State, cone};
 
-/// Operations of all factorisations here at most: some tenths of a second, 200 for 80 contacts that stick.
-const MOST_WORK: f64 = 1e9;
-
 /// Of the largest force and the largest |q|: what contradicts a state by less is round-off.
 const ROUND_OFF: f64 = 1e-12;
 
@@ -32,6 +29,11 @@ impl Run<'_> {
     /// steps in which hardly a state changes; and again with the directions found.
     pub(super) fn pivot(&mut self, scratch: &mut Scratch, best: &mut Best) {
         self.settle(scratch);
+        self.pivot_from_states(scratch, best);
+    }
+
+    /// Likewise from states as they are, whatever the forces.
+    pub(super) fn pivot_from_states(&mut self, scratch: &mut Scratch, best: &mut Best) {
         for _ in 0..MOST_TURNS {
             scratch.newton.is_straight = true;
             let is_complementary = self.pivot_straight(scratch);
@@ -143,7 +145,7 @@ impl Run<'_> {
     }
 
     fn is_spent(&self) -> bool {
-        self.work > MOST_WORK || self.is_over()
+        self.work > self.most_work || self.is_over()
     }
 
     /// Contacts that contradict their state, and the last of them; changes those asked for.

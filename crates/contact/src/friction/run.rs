@@ -17,6 +17,9 @@ pub(super) const GOAL: f64 = 10.0 * lcp::GOAL;
 /// Natural residual at which nothing slower than Newton's method is tried: round-off of large or uneven problems.
 const ENOUGH: f64 = 1e-11;
 
+/// Operations of all factorisations by pivoting at most: some tenths of a second, 200 for 80 contacts that stick.
+const MOST_WORK: f64 = 1e9;
+
 /// Newton steps in a row that may lose: the states change under them.
 const MAX_LOSSES: usize = 4;
 
@@ -46,20 +49,8 @@ pub(super) fn run(
             index,
         });
     }
-    let per_q = certificate::per_size(problem.q());
-    scratch.contacts.reset(problem, 1.0 / per_q);
-    scratch.newton.is_regularised = false;
-    let mut run = Run {
-        problem,
-        settings,
-        forces,
-        u: slip,
-        per_q,
-        sweeps: 0,
-        newton_steps: 0,
-        pivots: 0,
-        work: 0.0,
-    };
+    let mut run = Run::new(problem, settings, forces, slip, MOST_WORK);
+    run.reset(scratch);
     let has_friction = problem.friction_coefficients().iter().any(|mu| *mu > 0.0);
     if !is_warm || !has_friction {
         run.start_without_friction(scratch)?;
@@ -98,11 +89,42 @@ pub(super) struct Run<'a> {
     newton_steps: usize,
     /// Factorisations besides.
     pub(super) pivots: usize,
-    /// Their operations.
+    /// Their operations, and how many there may be.
     pub(super) work: f64,
+    pub(super) most_work: f64,
+}
+
+impl<'a> Run<'a> {
+    /// From `forces` as they are; `slip` is written.
+    pub(super) fn new(
+        problem: &'a Problem<'a>,
+        settings: &'a Settings,
+        forces: &'a mut [f64],
+        slip: &'a mut [f64],
+        most_work: f64,
+    ) -> Self {
+        Self {
+            problem,
+            settings,
+            forces,
+            u: slip,
+            per_q: certificate::per_size(problem.q()),
+            sweeps: 0,
+            newton_steps: 0,
+            pivots: 0,
+            work: 0.0,
+            most_work,
+        }
+    }
 }
 
 impl Run<'_> {
+    /// All contacts open, and nothing known of the matrix.
+    pub(super) fn reset(&self, scratch: &mut Scratch) {
+        scratch.contacts.reset(self.problem, 1.0 / self.per_q);
+        scratch.newton.is_regularised = false;
+    }
+
     /// The given forces, inside their cones, and the states they tell.
     fn start_warm(&mut self, scratch: &mut Scratch) {
         let problem = self.problem;
@@ -174,10 +196,7 @@ impl Run<'_> {
     /// Newton's method first; where it does not end, sweeps and Newton's method in turns. Leaves the best forces.
     fn solve(&mut self, scratch: &mut Scratch, is_warm: bool) -> Result<(), Error> {
         let n_rows = self.forces.len();
-        let mut best = Best {
-            residual: f64::INFINITY,
-            is_current: false,
-        };
+        let mut best = Best::none();
         best.see(self, &mut scratch.best);
         scratch.start[..n_rows].copy_from_slice(self.forces);
         self.newton(scratch, &mut best);
@@ -215,12 +234,18 @@ impl Run<'_> {
                 self.pivot(scratch, &mut best);
             }
         }
+        self.take(&best, scratch);
+        Ok(())
+    }
+
+    /// Leaves the best forces.
+    pub(super) fn take(&mut self, best: &Best, scratch: &mut Scratch) {
         if !best.is_current {
+            let n_rows = self.forces.len();
             self.forces.copy_from_slice(&scratch.best[..n_rows]);
             self.update_gaps();
             scratch.contacts.find(self.problem, self.u, self.forces);
         }
-        Ok(())
     }
 
     /// Every contact once, the others standing still.
@@ -334,6 +359,13 @@ pub(super) struct Best {
 }
 
 impl Best {
+    pub(super) fn none() -> Self {
+        Self {
+            residual: f64::INFINITY,
+            is_current: false,
+        }
+    }
+
     /// Natural residual of the forces at hand.
     pub(super) fn see(&mut self, run: &Run, kept: &mut [f64]) -> f64 {
         let residual = certificate::natural_residual(run.problem, run.per_q, run.forces, run.u);

@@ -5,6 +5,7 @@
 //! way there. In, a rest, and out again if asked for.
 
 mod friction;
+mod others;
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -24,6 +25,7 @@ use crate::session::rates::ChosenRates;
 use crate::session::{Entry, Held, Record, Recording, part_extent, refuse_overlap};
 use crate::{Error, interrupt, setup};
 pub(crate) use friction::Seen;
+pub use others::OtherAnswer;
 
 /// Of the largest force, how far a force may be from the line between its neighbours: a peak is then known better.
 const BEND: f64 = 2e-3;
@@ -72,6 +74,8 @@ pub struct Driven {
     pub n_rounds: u32,
     /// Coulomb's coefficients, where friction is in it.
     pub friction: Option<Coefficients>,
+    /// Where friction is so large that the way may be another from there on.
+    pub other: Option<OtherAnswer>,
     /// By record: what part and springs hold, J.
     pub stored: Vec<f64>,
     /// The same way without friction, where friction is in this one.
@@ -215,6 +219,7 @@ pub fn run(
         let is_finer = n_rounds <= HALVINGS && way.halve_bends(&gone, finest);
         if !is_finer && (is_whole || n_rounds > HALVINGS) {
             return Ok(Driven {
+                other: drive.other_answer(&gone)?,
                 recording: gone.recording,
                 held: spec.held,
                 stopped_at: gone.stopped_at,
@@ -314,6 +319,8 @@ struct Gone {
     stopped_at: Option<f64>,
     /// m, place at which it could not be.
     met_at: f64,
+    /// By record: whether friction is large enough for other answers.
+    doubtful: Vec<bool>,
 }
 
 struct Drive<'a> {
@@ -334,6 +341,7 @@ impl Drive<'_> {
             stored: Vec::with_capacity(n),
             stopped_at: None,
             met_at: 0.0,
+            doubtful: Vec::with_capacity(n),
         };
         let mut reached = 0.0;
         for (k, &travel) in way.inwards.iter().enumerate() {
@@ -388,6 +396,7 @@ impl Drive<'_> {
         gone.recording.push(&entry, held, &report, contacts);
         gone.asked.push(travel);
         gone.stored.push(stored(self.engine, &report));
+        gone.doubtful.push(self.engine.may_have_other_answers());
         report
     }
 }
@@ -408,6 +417,7 @@ impl Gone {
         if self.asked.len() > 1 {
             self.asked.pop();
             self.stored.pop();
+            self.doubtful.pop();
             self.recording.records.pop();
         }
     }

@@ -49,7 +49,7 @@ pub use frozen::{FrozenProblem, Prediction};
 pub use held::Grip;
 use held::Held;
 use late::Late;
-use law::{Carried, Given, Law};
+use law::{Carried, Coulomb, Given, Law};
 use near::{Look, Near};
 pub use part::ContactPart;
 use places::Places;
@@ -135,6 +135,26 @@ impl Engine {
         match &self.law {
             Law::Frictionless(_) => 0,
             Law::Coulomb(coulomb) => coulomb.bytes(),
+        }
+    }
+
+    /// Whether friction is so large that other forces than those of the last step may obey its law as well.
+    pub fn may_have_other_answers(&self) -> bool {
+        let coulomb = self.answered_with_friction();
+        coulomb.is_some_and(|coulomb| coulomb.may_have_others(&self.rows))
+    }
+
+    /// What such forces would add to the force on the tool, N, part's frame: the most of those that were found, `None` where none
+    /// were. Allocates and takes up to some tenths of a second; not for the haptic step.
+    pub fn other_answer(&self) -> Option<DVec3> {
+        self.answered_with_friction()?.other_force(&self.rows)
+    }
+
+    /// Where there was a contact in the last step, so that its problem stands.
+    fn answered_with_friction(&self) -> Option<&Coulomb> {
+        match &self.law {
+            Law::Coulomb(coulomb) if !self.forces.carried().is_empty() => Some(coulomb),
+            _ => None,
         }
     }
 

@@ -108,8 +108,8 @@ impl Story<'_> {
         doubts.extend(teeth.map(|w| w.text.clone()));
         let elsewhere = elsewhere.warning(way);
         doubts.extend(elsewhere.clone());
-        let aside = self.doubts.iter().filter(|w| w.id == "left-symmetry-plane");
-        doubts.extend(aside.map(|w| w.text.clone()));
+        let aside = |w: &&Warning| ["left-symmetry-plane", "several-answers"].contains(&w.id);
+        doubts.extend(self.doubts.iter().filter(aside).map(|w| w.text.clone()));
         // A way that ends behind the snap ends at a seat.
         doubts.extend(self.stopped().filter(|_| snap.is_none()));
         let driven = self.judged(&verdicts, doubts, &strained.facts);

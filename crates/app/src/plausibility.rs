@@ -10,6 +10,7 @@ mod coupling;
 mod gave_way;
 mod groups;
 mod order;
+mod others;
 mod script;
 mod seam;
 mod spike;
@@ -97,6 +98,7 @@ pub(crate) fn after(
         teeth::from_node_to_node(&track, driven, &ran.prepared.loaded),
         spike::stands_alone(&track),
         aside::driven(scene, driven),
+        others::several_answers(ran.driven),
     ]
     .into_iter()
     .flatten()

@@ -12,6 +12,7 @@ mod docs;
 mod drive;
 mod fast_path;
 mod friction;
+mod friction_wedge;
 mod interior;
 mod multiply;
 mod p_method;

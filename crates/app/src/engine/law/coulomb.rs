@@ -7,8 +7,11 @@
 //! s: slip of the part's material point over the tool in the tangent plane at the end of the step; u⁰ and X⁰:
 //! displacement and pose of the tool at its start; M carries what was there along with the tool. The whole step counts,
 //! over all its strides and passes, also where a contact closed on the way. Nothing else is remembered, no stick flag and no
-//! anchor, but the way slipped where static friction differs from kinetic ([`Weakening`]). Forces and the tool's virtual coupling are in one problem, as without friction. Sources: Moreau 1988 and Jean
-//! 1999 for the implicit increment, de Saxcé and Feng 1998 for the cone.
+//! anchor, but the way slipped where static friction differs from kinetic ([`Weakening`]). Forces and the tool's virtual
+//! coupling are in one problem, as without friction. Sources: Moreau 1988 and Jean 1999 for the implicit increment, de Saxcé
+//! and Feng 1998 for the cone.
+
+mod others;
 
 use contact::Contact;
 use contact::delassus::{Frame, delassus_frames_into};

@@ -71,11 +71,11 @@ pub(super) fn run(case: &Case, ui: &Ui<'_>) -> Outcome {
             quantities.push(bench.compute(quantity, asked, quadrature, ui)?);
         }
     }
-    let told = bench
-        .walks
-        .iter()
-        .filter_map(|(_, walk)| walk.unsettled.as_deref());
-    let mut message: Vec<&str> = told.collect();
+    let walks = || bench.walks.iter().map(|(_, walk)| walk);
+    let told = walks().filter_map(|walk| walk.unsettled.as_deref());
+    // Of one walk: the others go the same way.
+    let other = walks().find_map(|walk| walk.other.as_deref());
+    let mut message: Vec<&str> = told.chain(other).collect();
     if quantities.iter().all(Quantity::is_informative) {
         message.push("all quantities are informative: computed and finite is all that is asked");
     }

@@ -38,6 +38,8 @@ pub(super) struct Walk {
     pub(super) listed: Vec<Listed>,
     /// The first increment that came to no end, in words.
     pub(super) unsettled: Option<String>,
+    /// The first listed pose at which other forces obey the law as well, in words.
+    pub(super) other: Option<String>,
 }
 
 impl Walk {
@@ -79,6 +81,7 @@ pub(super) fn walk(
     let mut walk = Walk {
         listed: vec![Listed::default()],
         unsettled: None,
+        other: None,
     };
     for leg in legs {
         let mut listed = Listed {
@@ -102,6 +105,9 @@ pub(super) fn walk(
             }
         }
         listed.look_at(&walker);
+        if walk.other.is_none() {
+            walk.other = other_answer(&walker, listed.force, walk.listed.len() + 1);
+        }
         walk.listed.push(listed);
     }
     Ok(walk)
@@ -186,6 +192,16 @@ impl Listed {
     pub(super) fn normal_force_sum(&self) -> f64 {
         self.active.iter().map(|c| c.normal_force).sum()
     }
+}
+
+/// Other forces than `own` (N, on the tool), in words.
+fn other_answer(walker: &Engine, own: DVec3, pose: usize) -> Option<String> {
+    let other = own + walker.other_answer()?;
+    Some(format!(
+        "from pose {pose} on, other forces obey the law of friction as well: on the tool {:.4?} N here, {:.4?} N there",
+        own.to_array(),
+        other.to_array()
+    ))
 }
 
 /// Why the answer of an increment is not one, in words.

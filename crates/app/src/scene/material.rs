@@ -1,7 +1,7 @@
 //! `[part.material]`: what the part is made of, by keys or by the name of a plastic that is known.
 //!
 //! Sources of the table: tensile modulus (ISO 527, 23 °C, at small strain) from the data sheet of the grade that is named;
-//! Poisson's ratio ("for plastics approx. 0.35") and the strain that is permissible once from Bayer, "Snap-Fit Joints for
+//! Poisson's ratio (0.35 for plastics in general) and the strain that is permissible once from Bayer, "Snap-Fit Joints for
 //! Plastics - A Design Guide". Others whose friction is known are not in it: their moduli differ by a factor of two or more
 //! between grades (PP, PE, PVC) or with the water they hold (PA: 3.1 and 1.1 GPa), or we have no source for all of it.
 

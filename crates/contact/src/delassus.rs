@@ -50,6 +50,20 @@ pub fn delassus_into(
 /// A contact's unit normal and two tangents, orthogonal, part's frame.
 pub type Frame = [DVec3; 3];
 
+/// Any frame of a unit normal.
+pub fn frame(normal: DVec3) -> Frame {
+    let (t1, t2) = normal.any_orthonormal_pair();
+    [normal, t1, t2]
+}
+
+/// The frame of a unit normal whose first tangent is as near to `tangent` as it can be.
+pub fn frame_along(normal: DVec3, tangent: DVec3) -> Frame {
+    match (tangent - normal * normal.dot(tangent)).try_normalize() {
+        Some(t1) => [normal, t1, normal.cross(t1)],
+        None => frame(normal),
+    }
+}
+
 /// As [`delassus_into`] along the normals and tangents of the contacts: column-major 3m x 3m, rows 3i normal, 3i + 1 and
 /// 3i + 2 tangents; what [`crate::friction`] solves.
 ///

@@ -13,7 +13,7 @@ use super::StepReport;
 use super::forces::Forces;
 use super::places::Places;
 use super::rows::{Bodies, Rows};
-pub(super) use coulomb::Coulomb;
+pub(super) use coulomb::{Coulomb, solve_cones};
 pub(super) use frictionless::Frictionless;
 
 /// Forces of the contacts, N.

@@ -14,7 +14,7 @@
 mod others;
 
 use contact::Contact;
-use contact::delassus::{Frame, delassus_frames_into};
+use contact::delassus::{Frame, delassus_frames_into, frame, frame_along};
 use contact::friction::{Coefficients, Problem, Scratch, Settings, State, Status, solve};
 use glam::DVec3;
 use glamx::DPose3;
@@ -57,7 +57,6 @@ pub(in super::super) struct Coulomb {
     kept: Vec<DVec3>,
     carrying: Vec<u32>,
     scratch: Scratch,
-    settings: Settings,
 }
 
 impl Coulomb {
@@ -89,7 +88,6 @@ impl Coulomb {
             kept: vec![DVec3::ZERO; n_keys],
             carrying: Vec::with_capacity(max_near),
             scratch: Scratch::new(max_rows),
-            settings: Settings::default(),
         }
     }
 
@@ -165,27 +163,21 @@ impl Coulomb {
     /// Tangents of each contact; like ones where contacts share a row.
     fn orient(&mut self, rows: &Rows) {
         self.frames.clear();
-        let own = |normal: DVec3| {
-            let (t1, t2) = normal.any_orthonormal_pair();
-            [normal, t1, t2]
-        };
         let Some(patches) = rows.share.patches() else {
             self.frames
-                .extend(rows.contacts.iter().map(|contact| own(contact.normal)));
+                .extend(rows.contacts.iter().map(|contact| frame(contact.normal)));
             return;
         };
         for patch in 0..patches.len() {
             let members = &rows.contacts[patches.range(patch)];
             let first = members
                 .first()
-                .map_or(DVec3::X, |contact| own(contact.normal)[1]);
-            self.frames.extend(members.iter().map(|contact| {
-                let n = contact.normal;
-                match (first - n * n.dot(first)).try_normalize() {
-                    Some(t1) => [n, t1, n.cross(t1)],
-                    None => own(n),
-                }
-            }));
+                .map_or(DVec3::X, |contact| frame(contact.normal)[1]);
+            self.frames.extend(
+                members
+                    .iter()
+                    .map(|contact| frame_along(contact.normal, first)),
+            );
         }
     }
 
@@ -261,34 +253,12 @@ impl Coulomb {
             motion,
             coefficients,
             scratch,
-            settings,
             ..
         } = self;
         let (q, force) = (&q[..n], &mut force[..n]);
-        let solution = Problem::trusted_symmetric(&w_matrix[..n * n], q, &coefficients[..m])
-            .and_then(|problem| {
-                solve(
-                    &problem,
-                    settings,
-                    scratch,
-                    is_warm,
-                    force,
-                    &mut motion[..n],
-                )
-            });
-        match solution {
-            Ok(solution) => {
-                report.pivots += (solution.sweeps + solution.newton_steps) as u32;
-                report.certificate = solution.certificate.natural_residual;
-                report.lcp_solved = solution.status == Status::Solved;
-            }
-            // Only data that are not finite: no force, and the report says so.
-            Err(_) => {
-                force.fill(0.0);
-                motion[..n].fill(0.0);
-                (report.certificate, report.lcp_solved) = (f64::INFINITY, false);
-            }
-        }
+        let problem = Problem::trusted_symmetric(&w_matrix[..n * n], q, &coefficients[..m]);
+        let motion = &mut motion[..n];
+        solve_cones(problem, scratch, is_warm, force, motion, report);
         self.spread(rows, places, report);
     }
 
@@ -345,6 +315,33 @@ impl Coulomb {
                 }
                 report.sticking += u32::from(sticks);
             }
+        }
+    }
+}
+
+/// Forces and motions of rows of three, and what the report says of them.
+pub(in super::super) fn solve_cones(
+    problem: Result<Problem<'_>, contact::Error>,
+    scratch: &mut Scratch,
+    is_warm: bool,
+    force: &mut [f64],
+    motion: &mut [f64],
+    report: &mut StepReport,
+) {
+    let settings = Settings::default();
+    let solution =
+        problem.and_then(|problem| solve(&problem, &settings, scratch, is_warm, force, motion));
+    match solution {
+        Ok(solution) => {
+            report.pivots += (solution.sweeps + solution.newton_steps) as u32;
+            report.certificate = solution.certificate.natural_residual;
+            report.lcp_solved = solution.status == Status::Solved;
+        }
+        // Only data that are not finite: no force, and the report says so.
+        Err(_) => {
+            force.fill(0.0);
+            motion.fill(0.0);
+            (report.certificate, report.lcp_solved) = (f64::INFINITY, false);
         }
     }
 }

@@ -7,13 +7,15 @@
 //! where they were when the tick began. Where planes are kept, q_t = -(W λ⁰)_t - h_t·(motion of the target in the tick).
 
 use contact::Contact;
-use contact::delassus::{ComplianceBlocks, CouplingCompliance, Frame, delassus_frames_into};
-use contact::friction::{Problem, Scratch, Settings, State, Status, solve};
+use contact::delassus::{
+    ComplianceBlocks, CouplingCompliance, Frame, delassus_frames_into, frame, frame_along,
+};
+use contact::friction::{Problem, Scratch, State};
 use glam::DVec3;
 use glamx::DPose3;
 
 use super::super::super::StepReport;
-use super::super::super::law::ByContact;
+use super::super::super::law::{ByContact, solve_cones};
 use super::{Measured, dot};
 
 #[derive(Debug)]
@@ -35,7 +37,6 @@ pub(in super::super) struct Coulomb {
     /// (m, rad), of the target since the step, in the last tick.
     moved: [f64; 6],
     scratch: Scratch,
-    settings: Settings,
 }
 
 impl Coulomb {
@@ -53,7 +54,6 @@ impl Coulomb {
             tool_pose: DPose3::IDENTITY,
             moved: [0.0; 6],
             scratch: Scratch::new(rows),
-            settings: Settings::default(),
         }
     }
 
@@ -65,10 +65,8 @@ impl Coulomb {
         reference: DVec3,
     ) {
         self.frames.clear();
-        self.frames.extend(contacts.iter().map(|contact| {
-            let (t1, t2) = contact.normal.any_orthonormal_pair();
-            [contact.normal, t1, t2]
-        }));
+        self.frames
+            .extend(contacts.iter().map(|contact| frame(contact.normal)));
         self.tool_rows.clear();
         let of_rows = contacts.iter().zip(&self.frames);
         self.tool_rows.extend(
@@ -101,7 +99,8 @@ impl Coulomb {
 
     pub(super) fn measure_gaps(&mut self, measured: &Measured<'_>, forces: &ByContact) {
         for (frame, contact) in self.frames.iter_mut().zip(measured.contacts) {
-            *frame = turned(frame, contact.normal);
+            // Its tangents go along as the normal turns.
+            *frame = frame_along(contact.normal, frame[1]);
         }
         self.take_off(forces);
         let carried = measured.tool_pose * self.tool_pose.inverse();
@@ -142,24 +141,8 @@ impl Coulomb {
         let (force, motion) = (&mut self.force[..n], &mut self.motion[..n]);
         let is_warm = force.iter().any(|force| *force != 0.0);
         let (w, q) = (&self.w_matrix[..n * n], &self.q[..n]);
-        let solution =
-            Problem::trusted_symmetric(w, q, &self.coefficients[..m]).and_then(|problem| {
-                let scratch = &mut self.scratch;
-                solve(&problem, &self.settings, scratch, is_warm, force, motion)
-            });
-        match solution {
-            Ok(solution) => {
-                report.pivots = (solution.sweeps + solution.newton_steps) as u32;
-                report.certificate = solution.certificate.natural_residual;
-                report.lcp_solved = solution.status == Status::Solved;
-            }
-            // Only data that are not finite: no force, and the report says so.
-            Err(_) => {
-                force.fill(0.0);
-                motion.fill(0.0);
-                (report.certificate, report.lcp_solved) = (f64::INFINITY, false);
-            }
-        }
+        let problem = Problem::trusted_symmetric(w, q, &self.coefficients[..m]);
+        solve_cones(problem, &mut self.scratch, is_warm, force, motion, report);
         let states = self.scratch.states();
         let of_rows = force.chunks_exact(3).zip(motion.chunks_exact(3));
         for (row, ((force, motion), frame)) in of_rows.zip(&self.frames).enumerate() {
@@ -170,18 +153,6 @@ impl Coulomb {
             forces.sticks[row] = sticks;
             report.dissipated -= force[1] * motion[1] + force[2] * motion[2];
             report.sticking += u32::from(sticks && force[0] > 0.0);
-        }
-    }
-}
-
-/// A frame whose normal has turned: its tangents go along.
-fn turned(frame: &Frame, normal: DVec3) -> Frame {
-    let across = frame[1] - normal * normal.dot(frame[1]);
-    match across.try_normalize() {
-        Some(t1) => [normal, t1, normal.cross(t1)],
-        None => {
-            let (t1, t2) = normal.any_orthonormal_pair();
-            [normal, t1, t2]
         }
     }
 }

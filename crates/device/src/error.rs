@@ -57,6 +57,18 @@ pub enum DeviceError {
         /// What the operating system or the device said.
         reason: String,
     },
+    /// The device or its server has gone: it must be opened anew.
+    #[error("{reason}")]
+    Gone {
+        /// What the operating system or the device said.
+        reason: String,
+    },
+    /// The newest sample of the device is too old. Carries no text: the loop meets it once a period.
+    #[error("no sample from the device for {age_s:.3} s")]
+    Silent {
+        /// Age of the newest sample, s.
+        age_s: f64,
+    },
     /// The device failed for too many periods in a row; the loop was ended with zero force.
     #[error(
         "the device failed {failures} times in a row; the loop was ended with zero force \

@@ -150,11 +150,10 @@ impl SimulatedHand {
     #[must_use]
     pub fn state(&self) -> HandleState {
         HandleState {
-            pose: self.pose,
             linear_velocity: self.linear_velocity,
             angular_velocity: self.angular_velocity,
             time_s: self.time_s(),
-            buttons: 0,
+            ..HandleState::at_rest(self.pose)
         }
     }
 

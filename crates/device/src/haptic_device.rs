@@ -1,6 +1,6 @@
 //! What a haptic device is to the loop: a pose to read, a wrench to render, and limits.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use glamx::DPose3;
 
 use crate::error::DeviceError;
@@ -19,6 +19,34 @@ pub struct HandleState {
     pub time_s: f64,
     /// Buttons of the handle, one bit each, bit 0 first; 1 is pressed.
     pub buttons: u32,
+    /// Whether a hand holds the handle.
+    pub hand: HandPresence,
+    /// Whether the device would render a force now.
+    pub readiness: Readiness,
+}
+
+/// What a device's own sensor (deadman) says of the hand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum HandPresence {
+    /// The device has no such sensor.
+    #[default]
+    Unknown,
+    /// A hand holds the handle.
+    Present,
+    /// No hand holds it: no force may go to it.
+    Absent,
+}
+
+/// Whether a device would render a force now, in its own words where not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Readiness {
+    /// It would.
+    #[default]
+    Ready,
+    /// Not yet: what it waits for (calibration, power).
+    Waiting(&'static str),
+    /// It has cut the force by itself: why. Arming begins again after this.
+    Tripped(&'static str),
 }
 
 impl HandleState {
@@ -31,6 +59,8 @@ impl HandleState {
             angular_velocity: DVec3::ZERO,
             time_s: 0.0,
             buttons: 0,
+            hand: HandPresence::Unknown,
+            readiness: Readiness::Ready,
         }
     }
 
@@ -54,7 +84,7 @@ pub struct Limits {
     pub continuous_force: f64,
     /// Largest force, for a short time, N.
     pub peak_force: f64,
-    /// Largest torque, N m. No longer-term limit on torque is modelled.
+    /// Largest torque, N m; 0 where the device renders forces alone. No longer-term limit on torque is modelled.
     pub peak_torque: f64,
     /// Smallest change of position that is reported, m. 0: not stated, positions pass unrounded.
     pub position_resolution: f64,
@@ -64,6 +94,58 @@ pub struct Limits {
     pub rotation_resolution: f64,
     /// Largest stiffness the maker says can be rendered, N/m; `None` where none is stated.
     pub max_stiffness: Option<f64>,
+    /// Largest rotational stiffness, N m/rad; `None` where none is stated.
+    pub max_rotational_stiffness: Option<f64>,
+    /// Largest damping that the device renders without buzzing, N s/m; `None` where none is stated.
+    pub max_damping: Option<f64>,
+    /// The device's own viscous damping b, N s/m; `None` where it is not known.
+    pub damping: Option<f64>,
+    /// The device's own dry friction, N; `None` where it is not known.
+    pub coulomb_friction: Option<f64>,
+}
+
+/// What a device is to render until the next command.
+///
+/// The wrench is the one at the handle's last pose. `stiffness` says how the force goes on from there: a device
+/// whose server has a faster loop of its own renders F + J (x − x₀) in it; the others render the wrench alone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Command {
+    /// On the handle, about the handle point, in the axes of the device's frame.
+    pub wrench: Wrench,
+    /// J = dF/dx, N/m, row i is dF_i/dx: of a spring that resists, negative semi-definite.
+    pub stiffness: DMat3,
+}
+
+impl Command {
+    /// No force, wherever the handle goes.
+    pub const ZERO: Self = Self {
+        wrench: Wrench::ZERO,
+        stiffness: DMat3::ZERO,
+    };
+
+    /// The same, weaker by a factor in [0, 1].
+    #[must_use]
+    pub fn faded(&self, gain: f64) -> Self {
+        Self {
+            wrench: self.wrench * gain,
+            stiffness: self.stiffness * gain,
+        }
+    }
+
+    /// Are all numbers finite?
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.wrench.is_finite() && self.stiffness.is_finite()
+    }
+}
+
+impl From<Wrench> for Command {
+    fn from(wrench: Wrench) -> Self {
+        Self {
+            wrench,
+            stiffness: DMat3::ZERO,
+        }
+    }
 }
 
 impl Limits {
@@ -85,6 +167,10 @@ impl Limits {
             force_resolution: 0.2,
             rotation_resolution: 3e-5,
             max_stiffness: None,
+            max_rotational_stiffness: None,
+            max_damping: None,
+            damping: None,
+            coulomb_friction: None,
         }
     }
 }
@@ -111,11 +197,11 @@ pub trait HapticDevice: Send {
     /// Where no sample could be had; the caller goes on with the last good one.
     fn read(&mut self, time_s: f64) -> Result<HandleState, DeviceError>;
 
-    /// Renders a wrench on the handle, about the handle point, until the next call.
+    /// Renders a command on the handle, about the handle point, until the next call.
     ///
     /// # Errors
-    /// Where the wrench could not be rendered.
-    fn write(&mut self, wrench_on_handle: &Wrench) -> Result<(), DeviceError>;
+    /// Where it could not be rendered.
+    fn write(&mut self, command: &Command) -> Result<(), DeviceError>;
 
     /// Zero force now, and none until the next `write`. Called at the end of the loop, also after a
     /// failure; must not fail.

@@ -89,7 +89,7 @@ pub use coupling::{
 pub use driver::simulated::{Simulated, SimulatedEvents, SimulatedSettings};
 pub use error::DeviceError;
 pub use hand::{HandSettings, SimulatedHand};
-pub use haptic_device::{HandleState, HapticDevice, Limits};
+pub use haptic_device::{Command, HandPresence, HandleState, HapticDevice, Limits, Readiness};
 pub use histogram::{TimeHistogram, TimeSummary};
 pub use safety::{Safety, SafetyEvents, SafetySettings, Watchdog};
 pub use script::{Insertion, Phase, Script, Target};

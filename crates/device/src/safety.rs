@@ -309,6 +309,16 @@ impl Watchdog {
         })
     }
 
+    /// That of a link: full for 20 ms, gone after 50 ms.
+    #[must_use]
+    pub(crate) fn for_link() -> Self {
+        Self {
+            timeout_s: Self::TIMEOUT_S,
+            ramp_s: 0.03,
+            fed_s: 0.0,
+        }
+    }
+
     /// Says that a new value came at `time_s`, s.
     pub fn feed(&mut self, time_s: f64) {
         self.fed_s = time_s;

@@ -186,7 +186,7 @@ impl<C: Clock> Servo<C> {
             }
             None => Wrench::ZERO,
         };
-        let written = device.write(&wrench_on_handle);
+        let written = device.write(&wrench_on_handle.into());
 
         let response_s = self.clock.since_release_s();
         let record = PeriodRecord {
@@ -211,7 +211,8 @@ impl<C: Clock> Servo<C> {
             let release = self.clock.wait();
             let wrench = self.safety.decay(self.clock.period_s());
             // The handle keeps moving; what it reports no longer matters.
-            let is_alive = device.read(release.time_s).is_ok() && device.write(&wrench).is_ok();
+            let is_alive =
+                device.read(release.time_s).is_ok() && device.write(&wrench.into()).is_ok();
             if !is_alive {
                 break;
             }

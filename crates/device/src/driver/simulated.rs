@@ -6,7 +6,7 @@ use glamx::DPose3;
 
 use crate::error::{DeviceError, check_not_negative, check_positive, check_setting};
 use crate::hand::SimulatedHand;
-use crate::haptic_device::{HandleState, HapticDevice, Limits};
+use crate::haptic_device::{Command, HandleState, HapticDevice, Limits};
 use crate::safety::Watchdog;
 use crate::wrench::{Wrench, limit_length, rotation_from_vector, rotation_vector};
 
@@ -238,8 +238,9 @@ impl HapticDevice for Simulated {
         Ok(self.sensed(time_s))
     }
 
-    fn write(&mut self, wrench_on_handle: &Wrench) -> Result<(), DeviceError> {
-        if !wrench_on_handle.is_finite() {
+    fn write(&mut self, command: &Command) -> Result<(), DeviceError> {
+        let wrench_on_handle = &command.wrench;
+        if !command.is_finite() {
             return Err(DeviceError::NonFiniteWrench {
                 device: self.name().to_owned(),
             });

@@ -7,6 +7,7 @@ use super::*;
 use crate::clock::{AsFastAsPossible, Driven, RealTime};
 use crate::driver::simulated::{Simulated, SimulatedSettings};
 use crate::hand::{HandSettings, SimulatedHand};
+use crate::haptic_device::Command;
 use crate::script::{Insertion, Script};
 
 const T: f64 = 1e-3;
@@ -59,11 +60,11 @@ impl HapticDevice for Bench {
         self.reads.remove(0)
     }
 
-    fn write(&mut self, wrench: &Wrench) -> Result<(), DeviceError> {
+    fn write(&mut self, command: &Command) -> Result<(), DeviceError> {
         if !self.is_writable {
             return Err(Self::no_answer());
         }
-        self.written.push(*wrench);
+        self.written.push(command.wrench);
         Ok(())
     }
 

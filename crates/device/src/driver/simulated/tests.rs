@@ -48,7 +48,7 @@ fn first_read_is_the_start_and_a_second_at_the_same_time_is_equal() {
 #[test]
 fn force_is_rendered_in_steps_of_the_resolution() {
     let mut device = resting();
-    device.write(&force(1.09, -0.31, 0.05)).unwrap();
+    device.write(&force(1.09, -0.31, 0.05).into()).unwrap();
     let rendered = device.rendered().force;
     assert!((rendered - DVec3::new(1.0, -0.4, 0.0)).length() < 1e-12);
     assert_eq!(device.events(), SimulatedEvents::default());
@@ -59,7 +59,7 @@ fn force_and_torque_beyond_the_peak_are_limited_in_their_direction() {
     let mut device = resting();
     for direction in [DVec3::X, DVec3::ONE, DVec3::new(-1.0, 2.0, 0.3)] {
         let wanted = direction.normalize() * 500.0;
-        device.write(&Wrench::new(wanted, wanted)).unwrap();
+        device.write(&Wrench::new(wanted, wanted).into()).unwrap();
         let rendered = device.rendered();
         assert!(rendered.force.length() <= 35.0 * (1.0 + 1e-12));
         assert!(rendered.force.length() > 34.0);
@@ -85,7 +85,7 @@ fn force_is_taken_back_to_the_continuous_one_when_the_window_is_full() {
     let mut last = 35.0;
     for k in 0..5000 {
         device.read(f64::from(k) * T).unwrap();
-        device.write(&force(35.0, 0.0, 0.0)).unwrap();
+        device.write(&force(35.0, 0.0, 0.0).into()).unwrap();
         let rendered = device.rendered().force.x;
         // Never up, and down by a few steps of the resolution at a time.
         assert!(rendered <= last && last - rendered < 4.0);
@@ -99,7 +99,7 @@ fn force_is_taken_back_to_the_continuous_one_when_the_window_is_full() {
     let mut cool = self::device(&still, settings);
     for k in 0..10_000 {
         cool.read(f64::from(k) * T).unwrap();
-        cool.write(&force(10.0, 0.0, 0.0)).unwrap();
+        cool.write(&force(10.0, 0.0, 0.0).into()).unwrap();
         assert_eq!(cool.rendered().force.x, 10.0);
     }
 }
@@ -131,8 +131,8 @@ fn orientation_and_position_are_read_in_steps_of_their_resolution() {
 #[test]
 fn non_finite_wrench_is_refused_and_not_rendered() {
     let mut device = resting();
-    device.write(&force(1.0, 0.0, 0.0)).unwrap();
-    let error = device.write(&force(f64::NAN, 0.0, 0.0)).unwrap_err();
+    device.write(&force(1.0, 0.0, 0.0).into()).unwrap();
+    let error = device.write(&force(f64::NAN, 0.0, 0.0).into()).unwrap_err();
     assert!(matches!(error, DeviceError::NonFiniteWrench { .. }));
     assert_eq!(device.rendered().force.x, 1.0);
 }
@@ -141,7 +141,7 @@ fn non_finite_wrench_is_refused_and_not_rendered() {
 fn wrench_fades_to_zero_when_no_write_comes() {
     let mut device = resting();
     device.read(0.0).unwrap();
-    device.write(&force(20.0, 0.0, 0.0)).unwrap();
+    device.write(&force(20.0, 0.0, 0.0).into()).unwrap();
     let mut last = 20.0;
     for k in 1..=100 {
         device.read(f64::from(k) * T).unwrap();
@@ -152,7 +152,7 @@ fn wrench_fades_to_zero_when_no_write_comes() {
     }
     assert_eq!(last, 0.0);
     assert!(device.events().fading > 0);
-    device.write(&force(20.0, 0.0, 0.0)).unwrap();
+    device.write(&force(20.0, 0.0, 0.0).into()).unwrap();
     device.read(0.101).unwrap();
     assert_eq!(device.felt().force.x, 20.0);
     device.stop();
@@ -199,7 +199,7 @@ fn handle_stops_at_the_wall_of_the_workspace() {
     let mut device = device(&still, settings);
     for k in 0..200 {
         device.read(f64::from(k) * T).unwrap();
-        device.write(&force(20.0, 0.0, 0.0)).unwrap();
+        device.write(&force(20.0, 0.0, 0.0).into()).unwrap();
     }
     let state = device.read(0.2).unwrap();
     assert!((state.pose.translation.x - 0.001).abs() < 1e-12);

@@ -10,6 +10,8 @@
 //! - [`HapticDevice`] is what a driver offers, [`Limits`] what its hardware can do.
 //! - [`driver::simulated`] is a device that needs no hardware: the figures of a Virtuose 6D, held by
 //!   the scripted [`SimulatedHand`].
+//! - [`Mapping`] places the handle in the scene: axes, scale, clutch, and the wrench back.
+//! - [`VelocityEstimator`] tells velocities from poses where a device reports none.
 //! - [`VirtualCoupling`] ties the simulated tool to the handle.
 //! - [`Safety`] stands between the simulation and the hand: no wrench beyond the limits, nothing that
 //!   is not finite, no jump; each intervention is counted.
@@ -77,9 +79,11 @@ mod error;
 mod hand;
 mod haptic_device;
 mod histogram;
+mod mapping;
 mod safety;
 mod script;
 mod servo;
+mod velocity;
 mod wrench;
 
 pub use clock::{AsFastAsPossible, Clock, Driven, RealTime, Release};
@@ -91,7 +95,9 @@ pub use error::DeviceError;
 pub use hand::{HandSettings, SimulatedHand};
 pub use haptic_device::{Command, HandPresence, HandleState, HapticDevice, Limits, Readiness};
 pub use histogram::{TimeHistogram, TimeSummary};
+pub use mapping::{Mapping, MappingSettings, Rotation};
 pub use safety::{Safety, SafetyEvents, SafetySettings, Watchdog};
 pub use script::{Insertion, Phase, Script, Target};
 pub use servo::{PeriodRecord, Servo, ServoReport, ServoSettings};
+pub use velocity::VelocityEstimator;
 pub use wrench::{Wrench, rotation_from_vector, rotation_vector};

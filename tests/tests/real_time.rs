@@ -110,7 +110,7 @@ fn no_step_of_an_insertion_allocates() {
             let report = engine.step(&at(share));
             touched += u32::from(report.contacts > 0);
             shared += u32::from(report.rows < report.near);
-            shape.update(&engine).unwrap();
+            shape.update(engine.active_contacts()).unwrap();
         }
         let after = ALLOCATIONS.load(Ordering::Relaxed);
         assert!(touched > 100, "{name}: contact in {touched} steps only");

@@ -17,7 +17,7 @@ use glam::DVec3;
 use glamx::DPose3;
 
 use crate::engine::{Engine, StepReport};
-use crate::follow::Follower;
+use crate::follow::{Follower, Reach};
 use crate::prepare::{Demand, PreparedCompliance, PreparedPart};
 use crate::report::{self, DriveRow};
 use crate::scene::{EffectChoice, Scene};
@@ -203,10 +203,11 @@ pub fn run(
     let tolerance = TOUCH * part_extent(&prepared.loaded.mesh) + engine.tool().error_bound();
     let mut way = Way::even(spec);
     let finest = spec.step * 0.5f64.powi(HALVINGS as i32);
+    let columns = Columns::of(prepared, engine);
     let mut drive = Drive {
         spec,
         engine,
-        columns: Columns::of(prepared),
+        columns,
         tolerance,
         progress,
     };
@@ -431,12 +432,12 @@ struct Columns {
 }
 
 impl Columns {
-    fn of(prepared: &PreparedPart) -> Option<Self> {
+    fn of(prepared: &PreparedPart, engine: &Engine) -> Option<Self> {
         match &prepared.compliance {
             PreparedCompliance::All(_) => None,
             PreparedCompliance::Near(demand) => Some(Self {
                 demand: Arc::clone(demand),
-                follower: Follower::new(demand, false),
+                follower: Follower::new(demand, Reach::of(engine), false),
                 drawn: vec![0.0; 3 * prepared.loaded.rows.len()],
             }),
         }
@@ -445,7 +446,7 @@ impl Columns {
     fn fetch_around(&mut self, engine: &Engine, tool_at: DPose3) {
         self.demand
             .draw_into(engine.active_contacts(), &mut self.drawn);
-        self.follower.look(engine, tool_at, &self.drawn);
+        self.follower.look(tool_at, &self.drawn);
     }
 }
 

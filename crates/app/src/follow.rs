@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 
+use contact::tool::Tool;
 use glam::DVec3;
 
 use crate::engine::Engine;
@@ -15,9 +16,28 @@ const LOOK_AHEAD: f64 = 5.0;
 /// And that far for what the tool moved since the last look.
 const MOTIONS_AHEAD: f64 = 4.0;
 
+/// The tool, and how far around it nodes may be touched.
+#[derive(Clone, Debug)]
+pub(crate) struct Reach {
+    tool: Tool,
+    /// m.
+    within: f64,
+}
+
+impl Reach {
+    /// That of an engine.
+    pub(crate) fn of(engine: &Engine) -> Self {
+        Self {
+            tool: engine.tool().clone(),
+            within: LOOK_AHEAD * engine.settings().max_stride + engine.reach_between_nodes(),
+        }
+    }
+}
+
 /// Asks for columns where the tool goes.
 pub(crate) struct Follower {
     demand: Arc<Demand>,
+    reach: Reach,
     worker: Option<Worker>,
     seen_at: Option<DVec3>,
 }
@@ -31,7 +51,7 @@ struct Worker {
 impl Follower {
     /// `beside`: fetch in a thread beside the steps, which do not wait; otherwise between them, so that two runs are
     /// alike.
-    pub(crate) fn new(demand: &Arc<Demand>, beside: bool) -> Self {
+    pub(crate) fn new(demand: &Arc<Demand>, reach: Reach, beside: bool) -> Self {
         let worker = beside.then(|| {
             // One request at a time: a newer look knows better.
             let (requests, wanted) = sync_channel(1);
@@ -44,6 +64,7 @@ impl Follower {
         });
         Self {
             demand: Arc::clone(demand),
+            reach,
             worker,
             seen_at: None,
         }
@@ -51,15 +72,14 @@ impl Follower {
 
     /// Looks where tool and surface are. `tool_at`: of the last step, part's frame, m. `drawn`: displacement of every
     /// row, m.
-    pub(crate) fn look(&mut self, engine: &Engine, tool_at: glamx::DPose3, drawn: &[f64]) {
+    pub(crate) fn look(&mut self, tool_at: glamx::DPose3, drawn: &[f64]) {
         let moved = self
             .seen_at
             .map_or(0.0, |then| (tool_at.translation - then).length());
         self.seen_at = Some(tool_at.translation);
-        let within = LOOK_AHEAD * engine.settings().max_stride
-            + MOTIONS_AHEAD * moved
-            + engine.reach_between_nodes();
-        let wanted = self.demand.wanted(engine.tool(), &tool_at, drawn, within);
+        let within = self.reach.within + MOTIONS_AHEAD * moved;
+        let tool = &self.reach.tool;
+        let wanted = self.demand.wanted(tool, &tool_at, drawn, within);
         if wanted.is_empty() {
             return;
         }

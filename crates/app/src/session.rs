@@ -1,159 +1,59 @@
-//! A headless session: a scripted hand on a simulated device pushes the tool onto the part, and
-//! every step is recorded.
+//! A session: a device's handle moves the tool or the part, the engine answers, and whoever listens is told.
 //!
+//! ```text
+//!   drive ──> when it ends, what the hand is doing
+//!   device ── handle ──> engine ── wrench ──> device         every period, on the loop's thread
+//!                          │
+//!                        ports ──> recording in memory, log for a file, newest snapshot for a viewer
+//! ```
 //! Frames: the scene's world is the part's rest frame at the start. If the handle holds the tool,
 //! the part stays; if it holds the part, the tool stays, and contact is solved in the part's frame
 //! all the same.
 
 mod beside;
+mod drive;
 pub mod fast;
 pub mod handover;
 mod held;
+pub mod live;
+pub mod log;
 mod overlap;
+mod ports;
 pub mod rates;
-mod recorder;
+mod recording;
 pub mod slew;
 pub mod slow;
+mod snap;
+mod watch;
 
-use std::ops::Range;
 use std::time::Instant;
 
 use device::{
-    AsFastAsPossible, Clock, HandSettings, HapticDevice, Insertion, Phase, RealTime, Script, Servo,
-    ServoReport, ServoSettings, Simulated, SimulatedEvents, SimulatedHand, SimulatedSettings,
-    Wrench,
+    AsFastAsPossible, Clock, Command, HandSettings, HandleState, HapticDevice, Insertion, Mapping,
+    RealTime, Script, Servo, ServoSettings, Simulated, SimulatedHand, SimulatedSettings, Wrench,
 };
 use fem::Mesh;
 use glam::DVec3;
 use glamx::DPose3;
 
-use crate::engine::{ActiveContact, Engine, StepReport};
+use crate::Error;
+use crate::engine::{ActiveContact, Engine, Stage, StepReport};
 use crate::prepare::PreparedPart;
 use crate::shape::{self, Shape};
-use crate::{Error, interrupt};
-use fast::FastSettings;
-pub use held::{Held, Holds};
+use drive::Drive;
+use fast::{FastSettings, Tick};
+pub use held::{Gone, Held, Holds};
 pub use overlap::{Clearance, refuse_overlap};
-use rates::{ChosenRates, Rates, TwoRates, choose};
-use recorder::{Recorder, Solved};
+use ports::{Ports, Solved};
+pub use ports::{Sample, Snapshot, SnapshotInput, SnapshotOutput, snapshots};
+use rates::{Rates, TwoRates, choose};
+pub(crate) use recording::Entry;
+pub use recording::{Record, Recording};
 use slow::{SlowStep, Stepped};
+pub use snap::SnapWatch;
 
 /// Servo periods between two evaluations of the whole surface: 60 Hz at 1 kHz.
 const DISPLAY_INTERVAL: u64 = 16;
-
-/// One recorded period.
-#[derive(Clone, Debug)]
-pub struct Record {
-    /// Number of the period.
-    pub step: u64,
-    /// s, of the loop's clock.
-    pub time_s: f64,
-    /// What the hand is doing.
-    pub phase: Phase,
-    /// Handle in the world.
-    pub handle_pose: DPose3,
-    /// m, of the held body in the simulation, along the approach direction.
-    pub travel: f64,
-    /// m, of its grip across that direction.
-    pub sideways: f64,
-    /// rad, of the held body from how it stood at the start.
-    pub turn: f64,
-    /// On the handle, about the handle point, world; what the engine gives, before the device's
-    /// limits and resolution.
-    pub wrench_on_handle: Wrench,
-    /// The step.
-    pub report: StepReport,
-    /// ns, the whole step.
-    pub step_ns: u64,
-    /// ns, the surface multiply, in periods that had one.
-    pub multiply_ns: Option<u64>,
-    contacts: Range<usize>,
-}
-
-/// Everything a session leaves behind.
-#[derive(Debug)]
-pub struct Recording {
-    /// By period.
-    pub records: Vec<Record>,
-    /// Unit vector, world.
-    pub direction: DVec3,
-    /// Periods, misses and times of the loop.
-    pub servo: ServoReport,
-    /// What the simulated hardware limited.
-    pub device: SimulatedEvents,
-    /// Largest displacement of a surface node, m, seen at display rate.
-    pub max_surface_displacement: f64,
-    /// Whether whole steps were solved in the loop, and why.
-    pub rates: ChosenRates,
-    /// What two rates tell, if there were two.
-    pub two_rates: Option<TwoRates>,
-    contacts: Vec<ActiveContact>,
-}
-
-/// What a record is made of, besides the step itself.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Entry {
-    /// s, of the loop's clock; 0 without one.
-    pub(crate) time_s: f64,
-    pub(crate) phase: Phase,
-    pub(crate) handle_pose: DPose3,
-    pub(crate) wrench_on_handle: Wrench,
-    pub(crate) step_ns: u64,
-}
-
-impl Recording {
-    /// An empty one with memory for so many records. `direction`: of any length but zero.
-    pub(crate) fn with_room(direction: DVec3, n_records: usize, rates: ChosenRates) -> Self {
-        Self {
-            records: Vec::with_capacity(n_records),
-            direction: direction.normalize(),
-            servo: ServoReport::default(),
-            device: SimulatedEvents::default(),
-            max_surface_displacement: 0.0,
-            rates,
-            two_rates: None,
-            contacts: Vec::with_capacity(64 * n_records),
-        }
-    }
-
-    /// Adds a record. Does not allocate within the memory that was asked for.
-    pub(crate) fn push(
-        &mut self,
-        entry: &Entry,
-        held: &Held,
-        report: &StepReport,
-        contacts: &[ActiveContact],
-    ) {
-        let (body, start) = (held.pose(&report.tool_pose), held.start());
-        let moved = body.translation - start.translation;
-        let contacts_from = self.contacts.len();
-        self.contacts.extend_from_slice(contacts);
-        self.records.push(Record {
-            step: self.records.len() as u64,
-            time_s: entry.time_s,
-            phase: entry.phase,
-            handle_pose: entry.handle_pose,
-            travel: moved.dot(self.direction),
-            sideways: (moved - self.direction * moved.dot(self.direction)).length(),
-            turn: body.rotation.angle_between(start.rotation),
-            wrench_on_handle: entry.wrench_on_handle,
-            report: *report,
-            step_ns: entry.step_ns,
-            multiply_ns: None,
-            contacts: contacts_from..self.contacts.len(),
-        });
-    }
-
-    /// Contacts that carried force in a record.
-    pub fn contacts(&self, record: &Record) -> &[ActiveContact] {
-        &self.contacts[record.contacts.clone()]
-    }
-
-    /// N, along the approach direction, positive when it resists.
-    pub fn resistance(&self, record: &Record) -> f64 {
-        -record.wrench_on_handle.force.dot(self.direction)
-    }
-}
 
 /// What a session needs beyond the engine.
 #[derive(Clone, Debug)]
@@ -196,9 +96,8 @@ pub fn run(
 ) -> Result<Recording, Error> {
     let mesh = &prepared.loaded.mesh;
     refuse_overlap(&spec.clearance, mesh, engine.tool(), &spec.held.tool_pose)?;
-    let start = spec.held.start();
     let script = Script::new(&Insertion {
-        start,
+        start: spec.held.start(),
         direction: spec.direction,
         speed: spec.speed,
         travel: spec.travel,
@@ -207,138 +106,279 @@ pub fn run(
     })?;
     let n_periods = script.periods(spec.period_s);
     let hand = SimulatedHand::new(spec.hand, script, spec.period_s)?;
-    let device = Simulated::new(SimulatedSettings::default(), hand)?;
-    shape.follow(spec.real_time);
+    let mut device = Simulated::new(SimulatedSettings::default(), hand)?;
+    shape.follow(engine, spec.real_time);
     let rates = choose(spec, engine);
-    if spec.real_time && rates.every.is_none() {
-        // The display is in the loop then.
-        shape.never_wait();
-    }
+    let every = rates.every;
     let fast = FastSettings {
         period_s: spec.period_s,
         force_resolution: HapticDevice::limits(&device).force_resolution,
-        lever: part_extent(&prepared.loaded.mesh),
+        lever: part_extent(mesh),
         n_ticks: n_periods as usize,
     };
-    let every = rates.every;
-    let session = Session {
-        recorder: Recorder::new(spec, script, n_periods, rates),
-        device,
-        n_periods,
+    let settings = ServoSettings::for_limits(HapticDevice::limits(&device));
+    let mut recording = Recording::with_room(spec.direction, n_periods as usize, rates);
+    let mut session = Session {
+        device: &mut device,
+        course: Course {
+            held: spec.held,
+            mapped: None,
+            drive: Drive::Scripted { script, n_periods },
+            ports: Ports::recording(&mut recording),
+        },
         progress,
     };
-    let settings = ServoSettings::for_limits(HapticDevice::limits(&session.device));
-    match (spec.real_time, every) {
-        (false, None) => {
-            let servo = Servo::new(AsFastAsPossible::new(spec.period_s)?, settings)?;
-            session.run_one_rate(servo, engine, shape)
-        }
-        (true, None) => {
-            let servo = Servo::new(RealTime::new(spec.period_s)?, settings)?;
-            session.run_one_rate(servo, engine, shape)
-        }
-        (false, Some(every)) => {
-            let servo = Servo::new(AsFastAsPossible::new(spec.period_s)?, settings)?;
-            session.run_stepped(servo, every, engine, shape, fast)
-        }
-        (true, Some(_)) => {
-            let servo = Servo::new(RealTime::new(spec.period_s)?, settings)?;
-            session.run_beside(servo, engine, shape, fast)
-        }
+    if spec.real_time {
+        let mut servo = Servo::new(RealTime::new(spec.period_s)?, settings)?;
+        let (viewer, view) = snapshots(engine.settings().max_contacts);
+        session.course.ports.viewer = Some(viewer);
+        // The display has a thread of its own; there it may be late.
+        let (seen, two) = watch::beside(view, shape, || match every {
+            None => session.one_rate(&mut servo, engine, None).map(|()| None),
+            Some(_) => session.two_rates_beside(&mut servo, engine, fast).map(Some),
+        })?;
+        recording.servo = servo.report();
+        recording.two_rates = two;
+        seen.note(&mut recording);
+    } else {
+        let mut servo = Servo::new(AsFastAsPossible::new(spec.period_s)?, settings)?;
+        let two = match every {
+            None => session
+                .one_rate(&mut servo, engine, Some(shape))
+                .map(|()| None),
+            Some(every) => session
+                .stepped(&mut servo, every, engine, shape, fast)
+                .map(Some),
+        }?;
+        recording.servo = servo.report();
+        recording.two_rates = two;
     }
+    recording.device = device.events();
+    Ok(recording)
 }
 
+/// A session that goes on.
 struct Session<'a> {
-    recorder: Recorder<'a>,
-    device: Simulated,
-    n_periods: u64,
+    device: &'a mut dyn HapticDevice,
+    course: Course<'a>,
     progress: &'a dyn fem::Progress,
 }
 
-impl Session<'_> {
-    /// The whole step in the loop.
-    fn run_one_rate<C: Clock>(
-        mut self,
-        mut servo: Servo<C>,
-        engine: &mut Engine,
-        shape: &mut Shape,
-    ) -> Result<Recording, Error> {
-        for period in 0..self.n_periods {
-            if interrupt::is_requested() {
-                servo.release(&mut self.device);
-                return Err(Error::Interrupted);
-            }
-            let recorder = &mut self.recorder;
-            servo.step(&mut self.device, |handle| {
-                let begun = Instant::now();
-                let report = engine.step(&recorder.target(handle));
-                let step_ns = begun.elapsed().as_nanos() as u64;
-                let wrench = recorder.wrench_on_handle(handle, &report);
-                let solved = Solved {
-                    report,
-                    wrench_on_handle: wrench,
-                    step_ns,
-                };
-                recorder.push(handle, &solved, engine.active_contacts());
-                wrench
-            })?;
-            if period % DISPLAY_INTERVAL == 0 {
-                let multiply_ns = self.recorder.display(engine, shape)?;
-                self.recorder.note_multiply(period, multiply_ns);
-                self.tell_progress(period);
+/// What is moved, by whom, and who is told.
+struct Course<'a> {
+    held: Held,
+    /// How the device stands in the world; `None`: its frame is the world.
+    mapped: Option<Mapped>,
+    drive: Drive<'a>,
+    ports: Ports<'a>,
+}
+
+/// A device whose frame is not the world.
+struct Mapped {
+    mapping: Mapping,
+    /// Buttons of which each holds the clutch.
+    clutch: u32,
+}
+
+impl Course<'_> {
+    /// A handle in the world. Once a period.
+    fn in_world(&mut self, handle: &HandleState) -> HandleState {
+        match &mut self.mapped {
+            None => *handle,
+            Some(mapped) => {
+                let is_clutched = handle.buttons & mapped.clutch != 0;
+                mapped.mapping.to_world(handle, is_clutched)
             }
         }
-        servo.release(&mut self.device);
-        Ok(self.recorder.finish(&servo.report(), &self.device))
+    }
+
+    /// Pose of the tool that a handle in the world asks for, in the part's frame.
+    fn target(&self, handle: &HandleState) -> DPose3 {
+        self.held.target(&handle.pose)
+    }
+
+    /// On the handle about its point, world.
+    fn wrench_on_handle(&self, handle: &HandleState, report: &StepReport) -> Wrench {
+        self.held.wrench_on_handle(&handle.pose, report)
+    }
+
+    /// Tells the ports of a step, and gives the command for the device. `handle`: in the world.
+    fn tell(&mut self, handle: &HandleState, answer: Answer, contacts: &[ActiveContact]) -> Wrench {
+        let report = answer.report;
+        let gone = self.held.gone(&report.tool_pose, self.ports.direction);
+        let solved = Solved {
+            time_s: handle.time_s,
+            phase: self.drive.phase(handle.time_s, gone.travel),
+            handle_pose: handle.pose,
+            gone,
+            report,
+            wrench_on_handle: answer.wrench_on_handle,
+            step_ns: answer.step_ns,
+            contacts,
+        };
+        self.ports.solved(&self.held, &solved);
+        let on_handle = Command::from(answer.wrench_on_handle);
+        match &self.mapped {
+            None => on_handle,
+            Some(mapped) => mapped.mapping.to_device(&on_handle),
+        }
+        .wrench
+    }
+}
+
+/// What a period came to.
+struct Answer {
+    report: StepReport,
+    wrench_on_handle: Wrench,
+    step_ns: u64,
+}
+
+impl Answer {
+    /// That of a frozen problem.
+    fn of_tick(tick: &Tick, begun: Instant) -> Self {
+        let step_ns = begun.elapsed().as_nanos() as u64;
+        let mut report = tick.report;
+        report.stage_ns[Stage::Lcp as usize] = step_ns;
+        Self {
+            report,
+            wrench_on_handle: tick.wrench_on_handle,
+            step_ns,
+        }
+    }
+}
+
+impl Session<'_> {
+    /// The whole step in the loop. `shape`: is drawn between periods; only where no clock is waited for.
+    fn one_rate<C: Clock>(
+        &mut self,
+        servo: &mut Servo<C>,
+        engine: &mut Engine,
+        shape: Option<&mut Shape>,
+    ) -> Result<(), Error> {
+        let outcome = self.every_step(servo, engine, shape);
+        servo.release(self.device);
+        outcome
+    }
+
+    fn every_step<C: Clock>(
+        &mut self,
+        servo: &mut Servo<C>,
+        engine: &mut Engine,
+        mut shape: Option<&mut Shape>,
+    ) -> Result<(), Error> {
+        let mut period = 0;
+        while self.course.drive.goes_on(period)? {
+            let course = &mut self.course;
+            let record = servo.step(self.device, |handle| {
+                let handle = &course.in_world(handle);
+                let begun = Instant::now();
+                let report = engine.step(&course.target(handle));
+                let answer = Answer {
+                    report,
+                    wrench_on_handle: course.wrench_on_handle(handle, &report),
+                    step_ns: begun.elapsed().as_nanos() as u64,
+                };
+                course.tell(handle, answer, engine.active_contacts())
+            })?;
+            self.course.ports.over(&record);
+            if let Some(shape) = &mut shape
+                && period % DISPLAY_INTERVAL == 0
+            {
+                let multiply_ns = self.display(engine, shape)?;
+                self.note_multiply(period, multiply_ns);
+                self.tell_progress(period);
+            }
+            period += 1;
+        }
+        Ok(())
     }
 
     /// Two rates without a real clock: the engine works between two periods, and its result is due `every` later.
-    fn run_stepped<C: Clock>(
-        mut self,
-        mut servo: Servo<C>,
+    fn stepped<C: Clock>(
+        &mut self,
+        servo: &mut Servo<C>,
         every: u64,
         engine: &mut Engine,
         shape: &mut Shape,
         settings: FastSettings,
-    ) -> Result<Recording, Error> {
-        let start = self.recorder.start_target();
+    ) -> Result<TwoRates, Error> {
+        let start = self.course.held.target(&self.course.held.start());
         let mut stepped = Stepped::new(engine, &start, every, settings)?;
-        let mut slow: Vec<SlowStep> = Vec::with_capacity(self.n_periods as usize);
-        let mut shown = None;
-        for period in 0..self.n_periods {
-            if interrupt::is_requested() {
-                servo.release(&mut self.device);
-                return Err(Error::Interrupted);
+        let mut slow: Vec<SlowStep> = Vec::with_capacity(settings.n_ticks);
+        let outcome = self.every_due(servo, &mut stepped, engine, shape, &mut slow);
+        servo.release(self.device);
+        outcome?;
+        let two = TwoRates::new(stepped.into_fast().into_log(), slow);
+        for step in &two.steps {
+            if let Some(ns) = step.multiply_ns {
+                self.note_multiply(step.tick, ns);
             }
-            let recorder = &mut self.recorder;
-            let mut asked = None;
-            servo.step(&mut self.device, |handle| {
-                let target = recorder.target(handle);
-                asked = Some(target);
-                recorder.fast_tick(handle, |on_handle| {
-                    let answer = stepped.tick(period, &target, on_handle);
-                    (answer, stepped.fast().active_contacts())
-                })
-            })?;
-            let Some(mut step) = asked.and_then(|target| stepped.work(engine, period, &target))
-            else {
-                continue;
-            };
-            if is_display_due(&mut shown, period) {
-                step.multiply_ns = Some(self.recorder.display(engine, shape)?);
-                self.tell_progress(period);
-            }
-            slow.push(step);
         }
-        servo.release(&mut self.device);
-        let log = stepped.into_fast().into_log();
-        self.recorder.two_rates(TwoRates::new(log, slow));
-        Ok(self.recorder.finish(&servo.report(), &self.device))
+        Ok(two)
+    }
+
+    fn every_due<C: Clock>(
+        &mut self,
+        servo: &mut Servo<C>,
+        stepped: &mut Stepped,
+        engine: &mut Engine,
+        shape: &mut Shape,
+        slow: &mut Vec<SlowStep>,
+    ) -> Result<(), Error> {
+        let mut shown = None;
+        let mut period = 0;
+        while self.course.drive.goes_on(period)? {
+            let mut asked = None;
+            let course = &mut self.course;
+            let record = servo.step(self.device, |handle| {
+                let handle = &course.in_world(handle);
+                let target = course.target(handle);
+                asked = Some(target);
+                let begun = Instant::now();
+                let on_handle = |report: &StepReport| course.wrench_on_handle(handle, report);
+                let answer = stepped.tick(period, &target, on_handle);
+                let answer = Answer::of_tick(&answer, begun);
+                course.tell(handle, answer, stepped.fast().active_contacts())
+            })?;
+            self.course.ports.over(&record);
+            let step = asked.and_then(|target| stepped.work(engine, period, &target));
+            if let Some(mut step) = step {
+                if is_display_due(&mut shown, period) {
+                    step.multiply_ns = Some(self.display(engine, shape)?);
+                    self.tell_progress(period);
+                }
+                slow.push(step);
+            }
+            period += 1;
+        }
+        Ok(())
+    }
+
+    /// What the display would do between two steps, and its time, ns.
+    fn display(&mut self, engine: &Engine, shape: &mut Shape) -> Result<u64, Error> {
+        let begun = Instant::now();
+        let largest = shape::largest(shape.update(engine.active_contacts())?);
+        let elapsed_ns = begun.elapsed().as_nanos() as u64;
+        if let Some(tool_pose) = engine.tool_pose() {
+            shape.look_ahead(tool_pose);
+        }
+        if let Some(recording) = &mut self.course.ports.recording {
+            recording.see(largest);
+        }
+        Ok(elapsed_ns)
+    }
+
+    fn note_multiply(&mut self, period: u64, multiply_ns: u64) {
+        if let Some(recording) = &mut self.course.ports.recording {
+            recording.note_multiply(period, multiply_ns);
+        }
     }
 
     fn tell_progress(&self, period: u64) {
-        let total = self.n_periods as usize;
-        self.progress.advance("insert", period as usize, total);
+        if let Some(total) = self.course.drive.n_periods() {
+            self.progress
+                .advance("insert", period as usize, total as usize);
+        }
     }
 }
 
@@ -349,15 +389,6 @@ fn is_display_due(shown: &mut Option<u64>, tick: u64) -> bool {
         *shown = Some(tick);
     }
     is_due
-}
-
-/// What the display would do between two steps: the whole surface. Its largest displacement, m, and the time, ns.
-fn timed_display(engine: &mut Engine, shape: &mut Shape) -> Result<(f64, u64), Error> {
-    let begun = Instant::now();
-    let largest = shape::largest(shape.update(engine)?);
-    let elapsed_ns = begun.elapsed().as_nanos() as u64;
-    shape.look_ahead(engine);
-    Ok((largest, elapsed_ns))
 }
 
 /// m, diagonal of the part's bounding box.

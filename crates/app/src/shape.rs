@@ -13,12 +13,13 @@ mod tests;
 use std::path::Path;
 use std::sync::Arc;
 
+use glamx::DPose3;
 use gpu::{ComplianceMultiply, Layout};
 
 use crate::Error;
 use crate::choice::{self, Choice, Multiplier, choose};
-use crate::engine::Engine;
-use crate::follow::Follower;
+use crate::engine::{ActiveContact, ContactPart, Engine};
+use crate::follow::{Follower, Reach};
 use crate::prepare::{Demand, PreparedCompliance, PreparedPart};
 use crate::scene::{Accuracy, Adaptive, Multiply};
 use select::Select;
@@ -26,6 +27,7 @@ use select::Select;
 /// Displacement of all surface nodes, with its buffers.
 pub struct Shape {
     kind: Kind,
+    part: Arc<ContactPart>,
     columns: Vec<u32>,
     forces: Vec<f64>,
     displacement: Vec<f64>,
@@ -83,6 +85,7 @@ impl Shape {
         };
         Ok(Self {
             kind,
+            part: prepared.contact_part(),
             columns: Vec::with_capacity(n_columns),
             forces: Vec::with_capacity(3 * n_columns),
             displacement: vec![0.0; 3 * n_rows],
@@ -109,7 +112,7 @@ impl Shape {
     }
 
     /// From now on [`Self::update`] does not wait for a GPU: it gives the newest displacement that is ready, and asks
-    /// for that of the engine's state.
+    /// for that of these forces.
     pub fn never_wait(&mut self) {
         self.waits = false;
     }
@@ -125,16 +128,16 @@ impl Shape {
 
     /// Where columns are fetched: [`Self::look_ahead`] does so from now on. `beside`: in a thread of its own, so that
     /// nobody waits; otherwise runs are alike.
-    pub fn follow(&mut self, beside: bool) {
+    pub fn follow(&mut self, engine: &Engine, beside: bool) {
         if let Kind::Fetched(demand) = &self.kind {
-            self.follower = Some(Follower::new(demand, beside));
+            self.follower = Some(Follower::new(demand, Reach::of(engine), beside));
         }
     }
 
     /// Fetches columns where the tool goes, by the shape of the last [`Self::update`].
-    pub fn look_ahead(&mut self, engine: &Engine) {
-        if let (Some(follower), Some(tool_pose)) = (&mut self.follower, engine.tool_pose()) {
-            follower.look(engine, tool_pose, &self.displacement);
+    pub fn look_ahead(&mut self, tool_pose: DPose3) {
+        if let Some(follower) = &mut self.follower {
+            follower.look(tool_pose, &self.displacement);
         }
     }
 
@@ -146,18 +149,17 @@ impl Shape {
         }
     }
 
-    /// Displacement in the engine's state, 3 components for each of the part's rows, m; after [`Self::never_wait`] on a
+    /// Displacement under the contact forces of a step, 3 components for each of the part's rows, m; after [`Self::never_wait`] on a
     /// GPU that of an earlier update. Does not allocate, but where a GPU is given up.
     ///
     /// # Errors
     /// Those of the multiply, which an engine's state does not give.
-    pub fn update(&mut self, engine: &Engine) -> Result<&[f64], Error> {
-        let contacts = engine.active_contacts();
+    pub fn update(&mut self, contacts: &[ActiveContact]) -> Result<&[f64], Error> {
         self.columns.clear();
         self.forces.clear();
         if !matches!(self.kind, Kind::Fetched(_)) {
             // Forces on held nodes move nothing.
-            let part = engine.part();
+            let part = &self.part;
             for c in contacts.iter().filter(|c| !part.is_held(c.candidate)) {
                 self.columns.push(c.candidate);
                 self.forces.extend(c.force_on_part.to_array());
@@ -177,7 +179,7 @@ impl Shape {
                 note_given_up(multiply, &mut self.given_up);
             }
             Kind::Select(select) => {
-                let rest = engine.part().rest_positions();
+                let rest = self.part.rest_positions();
                 let given = (self.columns.as_slice(), self.forces.as_slice());
                 select.update(rest, given, self.waits, &mut self.displacement)?;
                 note_given_up(select.multiplier_mut().get(), &mut self.given_up);

@@ -6,6 +6,7 @@
 mod drive;
 
 use glam::DVec3;
+use glamx::DPose3;
 
 pub use self::drive::{DriveRow, Driven, FrictionFacts, coefficient_in_words};
 use super::origin::Origin;
@@ -217,6 +218,8 @@ pub struct StepRow {
     pub force_n: f64,
     /// Force that the simulation exerts on the handle, N.
     pub force_on_handle: DVec3,
+    /// Its torque about the handle point, N m.
+    pub torque_on_handle: DVec3,
     /// Nodes that carry force.
     pub contacts: u32,
     /// Pivots of all LCPs in the step.
@@ -225,10 +228,10 @@ pub struct StepRow {
     pub certificate: f64,
     /// Contact wrench against coupling wrench on the tool, relative; 0 is equilibrium.
     pub wrench_mismatch_rel: f64,
-    /// Position of the handle, m.
-    pub handle_position: DVec3,
-    /// Position of the tool's origin, m.
-    pub tool_position: DVec3,
+    /// Handle in the world, m.
+    pub handle_pose: DPose3,
+    /// Tool in the part's frame, m.
+    pub tool_pose: DPose3,
     /// Time of each stage in the order of [`STAGE_NAMES`], ns.
     pub stage_ns: [u64; N_STAGES],
     /// Time of the whole step, ns.

@@ -1,6 +1,7 @@
 //! A small made-up run for the tests of the writers.
 
 use glam::DVec3;
+use glamx::DPose3;
 
 use super::data::*;
 use super::origin::{InputFile, Origin};
@@ -53,12 +54,13 @@ pub(super) fn rows() -> Vec<StepRow> {
             travel_m,
             force_n,
             force_on_handle: DVec3::new(0.1, -force_n, 0.0),
+            torque_on_handle: DVec3::new(0.0, 0.0, 1e-3 * force_n),
             contacts: (force_n.abs() / 2.0) as u32,
             pivots: 3,
             certificate: 1e-16 * (step % 7) as f64,
             wrench_mismatch_rel: 1e-12,
-            handle_position: DVec3::new(0.0, -travel_m, 0.0),
-            tool_position: DVec3::new(0.0, -travel_m + force_n / 1e5, 0.0),
+            handle_pose: DPose3::from_translation(DVec3::new(0.0, -travel_m, 0.0)),
+            tool_pose: DPose3::from_translation(DVec3::new(0.0, -travel_m + force_n / 1e5, 0.0)),
             total_ns: stage_ns.iter().sum::<u64>() + 120,
             stage_ns,
             multiply_ns: step.is_multiple_of(16).then_some(40_000 + 20 * jitter),

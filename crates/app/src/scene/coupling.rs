@@ -19,6 +19,10 @@ pub struct Coupling {
     pub translational_stiffness: f64,
     /// N m/rad, > 0.
     pub rotational_stiffness: f64,
+    /// Whether the scene says so; a live session takes what the device allows where it does not.
+    pub is_translational_given: bool,
+    /// The same for turns.
+    pub is_rotational_given: bool,
 }
 
 #[derive(Debug, Default, Deserialize, JsonSchema)]
@@ -47,6 +51,8 @@ impl CouplingKeys {
                 ROTATIONAL_STIFFNESS,
                 Positive,
             )?,
+            is_translational_given: self.translational_stiffness.is_some(),
+            is_rotational_given: self.rotational_stiffness.is_some(),
         })
     }
 }

@@ -28,6 +28,17 @@ pub struct Held {
     pub tool_pose: DPose3,
 }
 
+/// How far a held body has gone from where it was at the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Gone {
+    /// m, of its grip along the approach direction.
+    pub travel: f64,
+    /// m, across it.
+    pub sideways: f64,
+    /// rad, from how it stood.
+    pub turn: f64,
+}
+
 impl Held {
     /// Held at the centre of its bounding box; a tool without bounds at its own origin.
     pub fn centred(holds: Holds, tool_pose: DPose3, tool: &Tool, mesh: &Mesh) -> Self {
@@ -91,6 +102,18 @@ impl Held {
         match self.holds {
             Holds::Tool => at_grip(tool_pose, self.grip),
             Holds::Part => at_grip(&(self.tool_pose * tool_pose.inverse()), self.grip),
+        }
+    }
+
+    /// How far it has gone from the start. `direction`: unit vector, world.
+    pub fn gone(&self, tool_pose: &DPose3, direction: DVec3) -> Gone {
+        let (body, start) = (self.pose(tool_pose), self.start());
+        let moved = body.translation - start.translation;
+        let travel = moved.dot(direction);
+        Gone {
+            travel,
+            sideways: (moved - direction * travel).length(),
+            turn: body.rotation.angle_between(start.rotation),
         }
     }
 

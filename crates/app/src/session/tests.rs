@@ -83,14 +83,22 @@ fn run_with(
     })
     .unwrap();
     let hand = SimulatedHand::new(spec.hand, script, spec.period_s).unwrap();
-    let device = Simulated::new(SimulatedSettings::default(), hand).unwrap();
+    let mut device = Simulated::new(SimulatedSettings::default(), hand).unwrap();
     let settings = ServoSettings::for_limits(HapticDevice::limits(&device));
     let mut servo = Servo::new(AsFastAsPossible::new(1e-3).unwrap(), settings).unwrap();
     let rates = choose(&spec, engine);
+    let mut recording = Recording::with_room(spec.direction, N_PERIODS as usize, rates);
     let mut session = Session {
-        recorder: Recorder::new(&spec, script, N_PERIODS, rates),
-        device,
-        n_periods: N_PERIODS,
+        device: &mut device,
+        course: Course {
+            held: spec.held,
+            mapped: None,
+            drive: Drive::Scripted {
+                script,
+                n_periods: N_PERIODS,
+            },
+            ports: Ports::recording(&mut recording),
+        },
         progress,
     };
     let mut first = slow::empty(engine);
@@ -110,7 +118,8 @@ fn run_with(
     };
     let fast = FastLoop::new(first, fast).unwrap();
     let log = session.beside(&mut servo, fast, boxes, solve);
-    let recording = session.recorder.finish(&servo.report(), &session.device);
+    recording.servo = servo.report();
+    recording.device = device.events();
     (log, recording)
 }
 

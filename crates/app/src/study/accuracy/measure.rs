@@ -260,7 +260,7 @@ fn computed(
             })
             .sum();
         found.potential.push(of_guide + of_part);
-        let u = shape.update(engine)?;
+        let u = shape.update(engine.active_contacts())?;
         if moments.contains(&place)
             && let Some(rows) = &rows
         {
@@ -302,7 +302,7 @@ fn time(ready: &mut Ready, way: &[Stop], timed_s: f64, found: &mut Measured) -> 
             let begun = Instant::now();
             let report = engine.step(&stop.target);
             let stepped = begun.elapsed();
-            shape.update(engine)?;
+            shape.update(engine.active_contacts())?;
             let all = begun.elapsed();
             rounds.spent_s += all.as_secs_f64();
             if stop.place.is_some() {

@@ -52,7 +52,7 @@ pub(super) fn measure(
             let tick = begun.elapsed();
             if stepped.work(engine, k as u64, target).is_some() {
                 let begun = Instant::now();
-                shape.update(engine)?;
+                shape.update(engine.active_contacts())?;
                 drawn.push(begun.elapsed().as_nanos() as u64);
             }
             if is_timed {

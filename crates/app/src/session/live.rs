@@ -1,0 +1,127 @@
+//! A session with a hand that nobody wrote a script for: it goes on until it is told to end.
+
+use std::sync::atomic::AtomicBool;
+
+use device::{Clock, HapticDevice, Mapping, RealTime, Servo, ServoReport, ServoSettings};
+
+use super::drive::{Drive, Heading};
+use super::fast::FastSettings;
+use super::ports::{Ports, SnapshotInput};
+use super::rates::{ChosenRates, TwoRates};
+use super::{Course, Mapped, Sample, Session, SessionSpec, SnapWatch};
+use crate::Error;
+use crate::engine::Engine;
+
+/// Hand-overs and steps of two rates that are kept: the first minutes of a session.
+const KEPT_TICKS: usize = 100_000;
+
+/// What a live session needs beyond the engine and the device.
+#[derive(Clone, Debug)]
+pub struct LiveSpec {
+    /// What is held and how, as for a script; the script itself is not gone.
+    pub session: SessionSpec,
+    /// From the device's frame to the world, at the start; `None`: the device's frame is the world.
+    pub mapping: Option<Mapping>,
+    /// Buttons of which each holds the clutch.
+    pub clutch: u32,
+    /// Periods at most.
+    pub n_periods: Option<u64>,
+    /// m, divides torques to compare them with forces.
+    pub lever: f64,
+    /// The loop and its guard.
+    pub servo: ServoSettings,
+}
+
+/// Who listens.
+#[derive(Debug)]
+pub struct LivePorts {
+    /// The newest period.
+    pub viewer: SnapshotInput,
+    /// Every period.
+    pub log: Option<rtrb::Producer<Sample>>,
+}
+
+/// What a live session leaves behind.
+#[derive(Debug)]
+pub struct LiveReport {
+    /// Periods, misses and times of the loop, and what the guard did.
+    pub servo: ServoReport,
+    /// The felt curve.
+    pub snap: SnapWatch,
+    /// Periods that are not in the log because its writer was too slow.
+    pub n_unlogged: u64,
+    /// What two rates tell, if there were two.
+    pub two_rates: Option<TwoRates>,
+}
+
+/// Runs until `stop`, Ctrl-C or the last period, on this thread; the device is released at the end.
+///
+/// Nothing grows while it goes on. A device that is lost gets no force and is waited for.
+///
+/// # Errors
+/// Settings that the loop refuses; an engine that ended on its own beside the loop.
+pub fn run(
+    spec: &LiveSpec,
+    rates: &ChosenRates,
+    device: &mut dyn HapticDevice,
+    engine: &mut Engine,
+    ports: LivePorts,
+    stop: &AtomicBool,
+) -> Result<LiveReport, Error> {
+    let clock = RealTime::new(spec.session.period_s)?;
+    run_on(clock, spec, rates, device, engine, ports, stop)
+}
+
+/// The same on any clock.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_on<C: Clock>(
+    clock: C,
+    spec: &LiveSpec,
+    rates: &ChosenRates,
+    device: &mut dyn HapticDevice,
+    engine: &mut Engine,
+    ports: LivePorts,
+    stop: &AtomicBool,
+) -> Result<LiveReport, Error> {
+    let fast = FastSettings {
+        period_s: spec.session.period_s,
+        force_resolution: device.limits().force_resolution,
+        lever: spec.lever,
+        n_ticks: KEPT_TICKS,
+    };
+    let mut servo = Servo::new(clock, spec.servo)?;
+    let mut session = Session {
+        device,
+        course: Course {
+            held: spec.session.held,
+            mapped: spec.mapping.clone().map(|mapping| Mapped {
+                mapping,
+                clutch: spec.clutch,
+            }),
+            drive: Drive::Live {
+                stop,
+                n_periods: spec.n_periods,
+                heading: Heading::new(),
+            },
+            ports: Ports {
+                direction: spec.session.direction.normalize(),
+                viewer: Some(ports.viewer),
+                log: ports.log,
+                ..Ports::default()
+            },
+        },
+        progress: &fem::Silent,
+    };
+    let two_rates = match rates.every {
+        None => session.one_rate(&mut servo, engine, None).map(|()| None),
+        Some(_) => session.two_rates_beside(&mut servo, engine, fast).map(Some),
+    }?;
+    Ok(LiveReport {
+        servo: servo.report(),
+        snap: session.course.ports.snap,
+        n_unlogged: session.course.ports.n_unlogged,
+        two_rates,
+    })
+}

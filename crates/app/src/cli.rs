@@ -3,8 +3,10 @@
 
 mod accuracy;
 mod cache;
+mod devices;
 mod doctor;
 mod effects;
+mod live;
 mod prepare;
 mod run;
 mod verify;
@@ -32,6 +34,8 @@ struct Cli {
 enum Command {
     /// Push the tool onto the part with a simulated hand and write a report.
     Run(run::RunArgs),
+    /// Feel a scene with a haptic device, in real time, until it is ended; no window.
+    Live(live::LiveArgs),
     /// Show what accuracy costs in time, for each choice: tables, CSV, plots.
     Accuracy(accuracy::AccuracyArgs),
     /// Show what each physical effect changes and costs, and which are simulated: table, CSV, plot.
@@ -44,6 +48,8 @@ enum Command {
     Verify(verify::VerifyArgs),
     /// Show the keys of a scene file as JSON Schema or as Markdown.
     Scene(SceneArgs),
+    /// List haptic devices: what is attached, what could be, and why not.
+    Devices(devices::DevicesArgs),
     /// Show what works on this machine and the mend for what does not.
     Doctor(doctor::DoctorArgs),
 }
@@ -139,12 +145,14 @@ fn command(
     let ui = Ui::new(err, std::io::stderr().is_terminal());
     let result = match &cli.command {
         Command::Run(args) => run::run(args, out, &ui),
+        Command::Live(args) => live::run(args, out, &ui),
         Command::Accuracy(args) => accuracy::run(args, out, &ui),
         Command::Effects(args) => effects::run(args, out, &ui),
         Command::Prepare(args) => prepare::run(args, out, &ui),
         Command::Cache(args) => cache::run(args, out),
         Command::Verify(args) => verify::run(args, out, &ui),
         Command::Scene(args) => show_scene_keys(args, out),
+        Command::Devices(args) => devices::run(args, out),
         Command::Doctor(args) => doctor::run(args, out),
     };
     match result {

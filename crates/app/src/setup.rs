@@ -421,10 +421,38 @@ pub fn session(scene: &Scene, held: Held) -> Option<SessionSpec> {
         },
         period_s: scene.device.servo_period,
         real_time: scene.device.real_time,
-        rates: match scene.accuracy.rates {
-            scene::Rates::Auto => Rates::Auto,
-            scene::Rates::One => Rates::One,
-            scene::Rates::Every(n) => Rates::Every(n),
-        },
+        rates: rates(scene),
     })
+}
+
+/// A session in real time with that hand; where the scene has none, with one that goes its own curve's way.
+pub fn live_session(scene: &Scene, held: Held, period_s: f64) -> SessionSpec {
+    /// m/s, of a hand that nobody described: slow enough to feel where the force turns.
+    const SPEED: f64 = 0.01;
+    let described = session(scene, held).unwrap_or_else(|| SessionSpec {
+        held,
+        clearance: clearance(scene),
+        direction: scene.drive.direction,
+        speed: SPEED,
+        travel: scene.drive.travel,
+        hold_s: 0.5,
+        retract: scene.drive.retract,
+        hand: HandSettings::default(),
+        period_s,
+        real_time: true,
+        rates: rates(scene),
+    });
+    SessionSpec {
+        period_s,
+        real_time: true,
+        ..described
+    }
+}
+
+fn rates(scene: &Scene) -> Rates {
+    match scene.accuracy.rates {
+        scene::Rates::Auto => Rates::Auto,
+        scene::Rates::One => Rates::One,
+        scene::Rates::Every(n) => Rates::Every(n),
+    }
 }

@@ -7,10 +7,11 @@ use device::{Clock, HapticDevice, Mapping, RealTime, Servo, ServoReport, ServoSe
 use super::drive::{Drive, Heading};
 use super::fast::FastSettings;
 use super::ports::{Ports, SnapshotInput};
-use super::rates::{ChosenRates, TwoRates};
-use super::{Course, Mapped, Sample, Session, SessionSpec, SnapWatch};
+use super::rates::{ChosenRates, TwoRates, choose};
+use super::{Course, Mapped, Sample, Session, SessionSpec, SnapWatch, refuse_overlap};
 use crate::Error;
 use crate::engine::Engine;
+use crate::prepare::PreparedPart;
 
 /// Hand-overs and steps of two rates that are kept: the first minutes of a session.
 const KEPT_TICKS: usize = 100_000;
@@ -52,6 +53,20 @@ pub struct LiveReport {
     pub n_unlogged: u64,
     /// What two rates tell, if there were two.
     pub two_rates: Option<TwoRates>,
+}
+
+/// Whether whole steps are solved in the loop, by a rehearsal of the scene's way; also warms the engine up.
+///
+/// # Errors
+/// A tool that overlaps the part at the start.
+pub fn rates(
+    spec: &SessionSpec,
+    prepared: &PreparedPart,
+    engine: &mut Engine,
+) -> Result<ChosenRates, Error> {
+    let mesh = &prepared.loaded.mesh;
+    refuse_overlap(&spec.clearance, mesh, engine.tool(), &spec.held.tool_pose)?;
+    Ok(choose(spec, engine))
 }
 
 /// Runs until `stop`, Ctrl-C or the last period, on this thread; the device is released at the end.

@@ -132,7 +132,8 @@ impl<'a> Ports<'a> {
     /// The step of a period was solved.
     pub(super) fn solved(&mut self, held: &Held, solved: &Solved<'_>) {
         let resistance = -solved.wrench_on_handle.force.dot(self.direction);
-        self.snap.follow(solved.gone.travel, resistance);
+        self.snap
+            .follow(solved.phase, solved.gone.travel, resistance);
         if let Some(recording) = &mut self.recording {
             let entry = Entry {
                 time_s: solved.time_s,

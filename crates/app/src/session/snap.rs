@@ -1,5 +1,7 @@
 //! Whether it has snapped: the peak of the force and its fall, seen while the hand goes on.
 
+use device::Phase;
+
 /// Of the peak, by how much the force falls when it snaps. Less is the roughness of a mesh: contact that goes from node
 /// to node steps by a tenth.
 const FALL: f64 = 0.3;
@@ -41,14 +43,16 @@ struct Rise {
 
 impl SnapWatch {
     /// The next period. `travel` m; `resistance` N, against going in, negative against pulling out.
-    pub(super) fn follow(&mut self, travel: f64, resistance: f64) {
+    pub(super) fn follow(&mut self, phase: Phase, travel: f64, resistance: f64) {
         if !(travel.is_finite() && resistance.is_finite()) {
             return;
         }
-        if resistance > self.peak_force {
+        // Behind its peak a part pulls the tool in: that is no retention.
+        let pulls_out = phase == Phase::Retract;
+        if !pulls_out && resistance > self.peak_force {
             (self.peak_force, self.travel_at_peak) = (resistance, travel);
         }
-        if -resistance > self.peak_retention {
+        if pulls_out && -resistance > self.peak_retention {
             (self.peak_retention, self.travel_at_retention) = (-resistance, travel);
         }
         let rise = &mut self.rise;
@@ -93,7 +97,11 @@ mod tests {
                 let at = |i: usize| -> (f64, f64) { pair[i] };
                 let travel = at(0).0 + t * (at(1).0 - at(0).0);
                 let force = at(0).1 + t * (at(1).1 - at(0).1);
-                watch.follow(1e-3 * travel, force);
+                let phase = match at(1).0 > at(0).0 {
+                    true => Phase::Approach,
+                    false => Phase::Retract,
+                };
+                watch.follow(phase, 1e-3 * travel, force);
             }
         }
     }
@@ -151,8 +159,8 @@ mod tests {
     #[test]
     fn what_is_not_finite_is_passed_over() {
         let mut watch = SnapWatch::default();
-        watch.follow(f64::NAN, 1.0);
-        watch.follow(0.0, f64::INFINITY);
+        watch.follow(Phase::Approach, f64::NAN, 1.0);
+        watch.follow(Phase::Approach, 0.0, f64::INFINITY);
         assert_eq!(watch, SnapWatch::default());
     }
 }

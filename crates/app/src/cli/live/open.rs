@@ -1,0 +1,170 @@
+//! The device of a live session: a real one by its name, or a simulated one that the scene's hand holds.
+
+use std::str::FromStr;
+use std::sync::mpsc::{Receiver, channel};
+
+use device::driver::{self, Unavailable};
+use device::{
+    HapticDevice, Insertion, Limits, Script, Simulated, SimulatedHand, SimulatedSettings,
+};
+use glam::{DMat3, DQuat, DVec3};
+
+use crate::Error;
+use crate::scene::Scene;
+use crate::session::SessionSpec;
+
+/// What stands before the colon of a simulated device's name.
+const SIMULATED: &str = "simulated";
+
+/// A device, ready.
+pub(super) struct Hand {
+    pub(super) device: Box<dyn HapticDevice>,
+    pub(super) notes: Vec<String>,
+    pub(super) messages: Receiver<String>,
+    /// Whether its frame is the scene's world.
+    pub(super) is_in_world: bool,
+    /// s, of a scripted hand.
+    pub(super) ends_after_s: Option<f64>,
+}
+
+impl Hand {
+    /// The device's limits, with the largest force that the user allows.
+    ///
+    /// # Errors
+    /// A largest force that is not one.
+    pub(super) fn limits(&self, max_force: Option<f64>) -> Result<Limits, Error> {
+        let limits = *self.device.limits();
+        let Some(most) = max_force else {
+            return Ok(limits);
+        };
+        if !(most.is_finite() && most > 0.0) {
+            return Err(Error::Input(format!(
+                "--max-force {most} is no force above 0 N"
+            )));
+        }
+        Ok(Limits {
+            peak_force: limits.peak_force.min(most),
+            continuous_force: limits.continuous_force.min(most),
+            ..limits
+        })
+    }
+}
+
+/// A device that is really there; `None` where the name is that of a simulated one.
+///
+/// # Errors
+/// Why it cannot be opened.
+pub(super) fn external(name: &str) -> Result<Option<Hand>, Error> {
+    if name.split(':').next() == Some(SIMULATED) {
+        return Ok(None);
+    }
+    let opened = driver::open(name).map_err(|why| cannot(name, &why))?;
+    Ok(Some(Hand {
+        device: opened.device,
+        notes: opened.notes,
+        messages: opened.messages,
+        is_in_world: false,
+        ends_after_s: None,
+    }))
+}
+
+fn cannot(name: &str, why: &Unavailable) -> Error {
+    Error::Input(format!("--device {name}: {why}"))
+}
+
+/// A simulated device, held by the scene's hand.
+///
+/// # Errors
+/// A way that leaves the device's workspace.
+pub(super) fn simulated(_name: &str, session: &SessionSpec) -> Result<Hand, Error> {
+    let script = Script::new(&Insertion {
+        start: session.held.start(),
+        direction: session.direction,
+        speed: session.speed,
+        travel: session.travel,
+        hold_s: session.hold_s,
+        retract: session.retract,
+    })?;
+    let ends_after_s = script.periods(session.period_s) as f64 * session.period_s;
+    let hand = SimulatedHand::new(session.hand, script, session.period_s)?;
+    let device = Simulated::new(SimulatedSettings::default(), hand)?;
+    // Nothing happens to a simulated device.
+    let (_, messages) = channel();
+    Ok(Hand {
+        notes: Vec::new(),
+        messages,
+        is_in_world: true,
+        ends_after_s: Some(ends_after_s),
+        device: Box::new(device),
+    })
+}
+
+/// The scene with the coupling that the device allows where the scene states none; with what to tell of it.
+pub(super) fn coupled(scene: Scene, limits: &Limits, period_s: f64) -> (Scene, String) {
+    let _ = (limits, period_s);
+    let text = format!(
+        "{:.0} N/m, {:.1} N m/rad",
+        scene.coupling.translational_stiffness, scene.coupling.rotational_stiffness
+    );
+    (scene, text)
+}
+
+/// A right-handed permutation of axes with signs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Axes(pub(super) DQuat);
+
+impl FromStr for Axes {
+    type Err = String;
+
+    /// `+x-z+y`: the device's x, y and z are the scene's x, -z and y.
+    fn from_str(text: &str) -> Result<Self, String> {
+        const HOW: &str = "write three axes with signs, such as +x-z+y: where the device's x, y and z point in the scene";
+        let letters: Vec<char> = text.chars().collect();
+        let columns: Option<Vec<DVec3>> = letters
+            .chunks(2)
+            .map(|pair| {
+                let sign = match pair.first()? {
+                    '+' => 1.0,
+                    '-' => -1.0,
+                    _ => return None,
+                };
+                let axis = match pair.get(1)? {
+                    'x' => DVec3::X,
+                    'y' => DVec3::Y,
+                    'z' => DVec3::Z,
+                    _ => return None,
+                };
+                Some(sign * axis)
+            })
+            .collect();
+        let Some([x, y, z]) = columns.as_deref() else {
+            return Err(HOW.to_owned());
+        };
+        let matrix = DMat3::from_cols(*x, *y, *z);
+        if matrix.determinant() != 1.0 {
+            return Err(format!(
+                "{text} is no right-handed frame: each axis once, and an even number of swaps and minus signs; {HOW}"
+            ));
+        }
+        Ok(Self(DQuat::from_mat3(&matrix)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn axes_turn_as_they_are_written() {
+        let axes: Axes = "+x-z+y".parse().unwrap();
+        assert!((axes.0 * DVec3::Y - DVec3::NEG_Z).length() < 1e-15);
+        assert!((axes.0 * DVec3::Z - DVec3::Y).length() < 1e-15);
+        let same: Axes = "+x+y+z".parse().unwrap();
+        assert!((same.0 * DVec3::new(1.0, 2.0, 3.0) - DVec3::new(1.0, 2.0, 3.0)).length() < 1e-15);
+        for bad in [
+            "", "x", "+x+y", "+x+y-z", "+x+x+z", "+x+y+z+x", "-x-y-z", "+a+b+c", "+x+y+é",
+        ] {
+            assert!(bad.parse::<Axes>().is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! What a live session tells at its end.
+
+use std::path::Path;
+
+use serde_json::{Value, json};
+
+use super::super::json_text;
+use crate::scene::Scene;
+use crate::session::live::LiveReport;
+use crate::session::log::Logged;
+
+/// A session that is over.
+pub(super) struct Told<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) device: &'a str,
+    pub(super) coupling: &'a str,
+    pub(super) period_s: f64,
+    pub(super) report: &'a LiveReport,
+    pub(super) logged: Option<&'a Logged>,
+    pub(super) recording: Option<&'a Path>,
+}
+
+impl Told<'_> {
+    /// For the terminal.
+    pub(super) fn text(&self) -> String {
+        let (snap, servo) = (&self.report.snap, &self.report.servo);
+        let us = |s: f64| 1e6 * s;
+        let mut text = format!(
+            "{}\n  device                {}\n  coupling              {}, in series with the contact\n  \
+             going in              {:.3} N at {:.3} mm of travel; snapped in {}\n  \
+             pulling out           {:.3} N at {:.3} mm; came off {}\n  \
+             loop                  {} periods of {} ms, {} missed ({} in a row at most), {} skipped\n  \
+             response              median {:.1} us, 99 % below {:.1} us, longest {:.1} us; woken late by {:.1}, {:.1}, {:.1} us\n",
+            self.scene.title,
+            self.device,
+            self.coupling,
+            snap.peak_force,
+            1e3 * snap.travel_at_peak,
+            times(snap.n_snaps_in),
+            snap.peak_retention,
+            1e3 * snap.travel_at_retention,
+            times(snap.n_snaps_out),
+            servo.periods,
+            1e3 * self.period_s,
+            servo.missed_deadlines,
+            servo.longest_miss_run,
+            servo.skipped,
+            us(servo.response.p50_s),
+            us(servo.response.p99_s),
+            us(servo.response.max_s),
+            us(servo.wake_delay.p50_s),
+            us(servo.wake_delay.p99_s),
+            us(servo.wake_delay.max_s),
+        );
+        text += &format!("  guard                 {}\n", self.guard_words());
+        if let (Some(path), Some(logged)) = (self.recording, self.logged) {
+            text += &format!(
+                "  recording             {} ({} steps{})\n",
+                path.display(),
+                logged.n_steps,
+                match self.report.n_unlogged {
+                    0 => String::new(),
+                    n => format!("; {n} more that the disk was too slow for"),
+                }
+            );
+        }
+        text
+    }
+
+    /// What the guard did, without what it did not.
+    fn guard_words(&self) -> String {
+        let events = guard(self.report);
+        let seen: Vec<String> = events
+            .iter()
+            .filter(|(_, n)| *n > 0)
+            .map(|(what, n)| format!("{what} {n}"))
+            .collect();
+        if seen.is_empty() {
+            "nothing to do".to_owned()
+        } else {
+            seen.join(", ")
+        }
+    }
+
+    /// For programs.
+    pub(super) fn json(&self) -> String {
+        let (snap, servo) = (&self.report.snap, &self.report.servo);
+        let times =
+            |t: &device::TimeSummary| json!({"p50": t.p50_s, "p99": t.p99_s, "max": t.max_s});
+        let events: serde_json::Map<String, Value> = guard(self.report)
+            .into_iter()
+            .map(|(what, n)| (what.replace(' ', "_"), json!(n)))
+            .collect();
+        json_text(&json!({
+            "title": self.scene.title,
+            "scene": self.scene.path,
+            "device": self.device,
+            "coupling": self.coupling,
+            "peak_insertion_force_N": snap.peak_force,
+            "travel_at_peak_m": snap.travel_at_peak,
+            "peak_retention_force_N": snap.peak_retention,
+            "travel_at_retention_m": snap.travel_at_retention,
+            "snaps_in": snap.n_snaps_in,
+            "snaps_out": snap.n_snaps_out,
+            "period_s": self.period_s,
+            "periods": servo.periods,
+            "missed": servo.missed_deadlines,
+            "longest_miss_run": servo.longest_miss_run,
+            "skipped": servo.skipped,
+            "wake_delay_s": times(&servo.wake_delay),
+            "compute_s": times(&servo.compute),
+            "response_s": times(&servo.response),
+            "guard": events,
+            "recording": self.recording,
+            "recorded_steps": self.logged.map(|l| l.n_steps),
+            "unrecorded_steps": self.report.n_unlogged,
+        }))
+    }
+}
+
+/// How often.
+fn times(n: u32) -> String {
+    match n {
+        0 => "never".to_owned(),
+        1 => "once".to_owned(),
+        n => format!("{n} times"),
+    }
+}
+
+/// What the guard counts, in words.
+fn guard(report: &LiveReport) -> Vec<(&'static str, u64)> {
+    let events = &report.servo.safety;
+    vec![
+        ("samples missing", events.samples_missing),
+        ("samples not finite", events.samples_non_finite),
+        ("samples not unit", events.samples_non_unit),
+        ("samples too fast", events.samples_too_fast),
+        ("samples back in time", events.samples_back_in_time),
+        ("wrenches not finite", events.wrenches_non_finite),
+        ("wrenches shortened", events.wrenches_clamped),
+        ("wrenches slowed", events.wrenches_rate_limited),
+        ("stalls", events.stalls),
+    ]
+}

@@ -1,4 +1,4 @@
-//! What the haptic step must never do: take memory from the heap, over a whole insertion.
+//! What the haptic step must never do: take memory from the heap, over a whole insertion and over a live session.
 //!
 //! A file of its own, because it replaces the allocator. Nothing here is timed.
 
@@ -6,15 +6,26 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::cell::Cell;
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use device::Wrench;
+use device::{
+    AsFastAsPossible, Command, DeviceError, HandleState, HapticDevice, Limits, Mapping,
+    MappingSettings, ServoSettings, Wrench,
+};
+use glam::DVec3;
 use glamx::DPose3;
 use snapin::engine::StepReport;
 use snapin::prepare::PreparedPart;
+use snapin::report::mcap_file;
 use snapin::scene::{Adaptive, Columns, ContactAt, FreeNodes, Multiply, Scalar, Scene};
 use snapin::session::fast::FastSettings;
+use snapin::session::live::{self, LivePorts, LiveSpec};
+use snapin::session::log::Log;
+use snapin::session::rates::Rates;
 use snapin::session::slow::Stepped;
+use snapin::session::snapshots;
 use snapin::setup;
 use snapin::shape::Shape;
 use snapin_tests::{root, shipped};
@@ -23,10 +34,20 @@ struct Counting;
 
 static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
 
+thread_local! {
+    /// Of this thread alone: beside a session a recording is written, and that allocates.
+    static OWN_ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
+}
+
+fn count() {
+    ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+    OWN_ALLOCATIONS.with(|own| own.set(own.get() + 1));
+}
+
 // SAFETY: every call is forwarded unchanged to the system's allocator; only a counter is added.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        count();
         // SAFETY: the caller's promises are passed on.
         unsafe { System.alloc(layout) }
     }
@@ -35,7 +56,7 @@ unsafe impl GlobalAlloc for Counting {
         unsafe { System.dealloc(pointer, layout) }
     }
     unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        count();
         // SAFETY: the caller's promises are passed on.
         unsafe { System.realloc(pointer, layout, size) }
     }
@@ -49,6 +70,7 @@ static ALLOCATOR: Counting = Counting;
 fn nothing_in_the_haptic_loop_allocates() {
     no_step_of_an_insertion_allocates();
     no_tick_of_two_rates_allocates();
+    no_period_of_a_live_session_allocates();
 }
 
 /// All scenes, pushed in and pulled out again, a jump of the handle and a pose that is refused; the
@@ -166,4 +188,123 @@ fn no_tick_allocates(scene: &Scene, prepared: &PreparedPart) {
     assert!(touched > 100, "contact in {touched} ticks only");
     assert_eq!(after - before, 0);
     assert!(stepped.fast().log().hand_overs.len() > 300);
+}
+
+/// Periods of the live session.
+const LIVE_PERIODS: u64 = 100_000;
+
+/// A handle that goes in and out along a line, a way each second; it notes what the loop's thread has allocated.
+struct InAndOut {
+    limits: Limits,
+    way: DVec3,
+    reads: u64,
+    before: u64,
+    after: u64,
+    largest: f64,
+}
+
+impl HapticDevice for InAndOut {
+    fn name(&self) -> &str {
+        "in and out"
+    }
+
+    fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    fn read(&mut self, time_s: f64) -> Result<HandleState, DeviceError> {
+        self.reads += 1;
+        let allocated = OWN_ALLOCATIONS.with(Cell::get);
+        if self.reads == 1 {
+            self.before = allocated;
+        }
+        self.after = allocated;
+        let share = 0.5 - 0.5 * (std::f64::consts::TAU * time_s).cos();
+        Ok(HandleState {
+            time_s,
+            ..HandleState::at_rest(DPose3::from_translation(share * self.way))
+        })
+    }
+
+    fn write(&mut self, command: &Command) -> Result<(), DeviceError> {
+        self.largest = self.largest.max(command.wrench.force.length());
+        Ok(())
+    }
+
+    fn stop(&mut self) {}
+}
+
+/// A hundred seconds at 1 kHz, in and out once a second, with a recording and a viewer attached; at one rate and at two.
+/// What was recorded is what was felt.
+fn no_period_of_a_live_session_allocates() {
+    for (rates, n_periods) in [(Rates::One, LIVE_PERIODS), (Rates::Every(2), 4_000)] {
+        let (scene, prepared) = shipped("clip.toml");
+        let scene = scene.with_friction(false);
+        let (tool, _) = setup::tool(&scene).unwrap();
+        let held = setup::held(&scene, &prepared, &tool);
+        let mut session = setup::live_session(&scene, held, 1e-3);
+        session.rates = rates;
+        let mut engine = setup::engine(&scene, &prepared, tool).unwrap();
+        let chosen = live::rates(&session, &prepared, &mut engine).unwrap();
+        let limits = Limits::virtuose_6d();
+        let mut device = InAndOut {
+            limits,
+            way: session.travel * session.direction,
+            reads: 0,
+            before: 0,
+            after: 0,
+            largest: 0.0,
+        };
+        let spec = LiveSpec {
+            mapping: Some(Mapping::new(MappingSettings::default(), held.start()).unwrap()),
+            clutch: 0,
+            n_periods: Some(n_periods),
+            lever: 0.05,
+            servo: ServoSettings::for_limits(&limits),
+            session,
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("session.mcap");
+        let (log, samples) = Log::create(&path, &BTreeMap::new()).unwrap();
+        let (viewer, mut view) = snapshots(engine.settings().max_contacts);
+        let ports = LivePorts {
+            viewer,
+            log: Some(samples),
+        };
+        let (stop, is_over) = (AtomicBool::new(false), AtomicBool::new(false));
+        let (report, logged) = std::thread::scope(|scope| {
+            let writer = scope.spawn(|| log.write(&is_over));
+            let clock = AsFastAsPossible::new(1e-3).unwrap();
+            let report = live::run_on(
+                clock,
+                &spec,
+                &chosen,
+                &mut device,
+                &mut engine,
+                ports,
+                &stop,
+            );
+            is_over.store(true, Ordering::Release);
+            (report.unwrap(), writer.join().unwrap().unwrap())
+        });
+        assert_eq!(report.servo.periods, n_periods);
+        assert_eq!(device.after - device.before, 0, "{rates:?}");
+        assert!(device.largest > 5.0, "{} N", device.largest);
+        assert_eq!(logged.n_steps + report.n_unlogged, n_periods);
+
+        let read = mcap_file::read(&std::fs::read(&path).unwrap()).unwrap();
+        assert!(read.is_whole);
+        assert_eq!(read.messages.len() as u64, logged.n_steps);
+        let largest = read.messages.iter().filter_map(|m| m.force_n);
+        let largest = largest.fold(0.0, f64::max);
+        assert!(largest <= report.snap.peak_force);
+        let (sample, snap) = {
+            view.update();
+            let snapshot = view.output_buffer();
+            (snapshot.sample.unwrap(), snapshot.snap)
+        };
+        assert_eq!(sample.step, n_periods - 1);
+        assert_eq!(snap, report.snap);
+        assert!(snap.n_snaps_in > 0 && snap.n_snaps_out > 0, "{snap:?}");
+    }
 }

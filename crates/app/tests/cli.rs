@@ -5,6 +5,8 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
+use snapin::report::mcap_file;
+
 fn scene() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/clip.toml")
 }
@@ -343,4 +345,137 @@ fn gpu_runs_where_there_is_an_adapter_and_gives_the_same_forces() {
     let summary: serde_json::Value = serde_json::from_slice(&summary).unwrap();
     assert_eq!(summary["multiply"]["why"], "asked");
     assert_eq!(summary["multiply"]["gpu"], true);
+}
+
+/// The clip with a hand that goes in within a second and then holds for a minute.
+fn scene_that_lasts(dir: &Path) -> PathBuf {
+    let text = std::fs::read_to_string(scene()).unwrap();
+    let folder = scene().parent().unwrap().to_string_lossy().into_owned();
+    let text = text
+        .replace("\"clip", &format!("\"{folder}/clip"))
+        .replace("hold = 0.3", "hold = 60.0");
+    let path = dir.join("lasting.toml");
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
+#[test]
+fn a_live_session_with_the_simulated_device_tells_its_curve_and_keeps_every_step() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = scene();
+    let args = ["live", scene.to_str().unwrap(), "--json"];
+    for n in ["001", "002"] {
+        let output = run(dir.path(), &args);
+        let err = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{err}");
+        let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert!(
+            told["peak_insertion_force_N"].as_f64().unwrap() > 5.0,
+            "{told}"
+        );
+        assert_eq!(told["snaps_in"], 1);
+        assert_eq!(told["unrecorded_steps"], 0);
+        // An earlier session is not written over.
+        let file = dir.path().join(format!("out/clip-live/session-{n}.mcap"));
+        let read = mcap_file::read(&std::fs::read(file).unwrap()).unwrap();
+        assert!(read.is_whole);
+        assert_eq!(told["recorded_steps"], read.messages.len());
+        let kept = std::fs::read(dir.path().join(format!("out/clip-live/session-{n}.json")));
+        assert_eq!(kept.unwrap(), output.stdout);
+    }
+}
+
+#[test]
+fn a_live_session_refuses_what_it_cannot_do_and_says_what_it_can() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = scene();
+    let scene = scene.to_str().unwrap();
+    for (args, word) in [
+        (&["--device", "phantom"][..], "snapin devices"),
+        (&["--device", "simulated:phantom"], "simulated:"),
+        (&["--rate", "5"], "between 100 and 10000"),
+        (&["--rate", "nan"], "between 100 and 10000"),
+        (&["--axes", "+x+x+z"], "right-handed"),
+        (&["--axes", "+x+y-z"], "right-handed"),
+        (&["--for", "-1"], "above 0"),
+        (&["--max-force", "0"], "above 0"),
+        (&["--clutch", "0"], "1..=32"),
+    ] {
+        let args: Vec<&str> = ["live", scene, "--no-recording"]
+            .iter()
+            .chain(args)
+            .copied()
+            .collect();
+        let output = run(dir.path(), &args);
+        let err = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{args:?}: {err}");
+        assert!(err.contains(word), "{args:?}: {err}");
+    }
+    let devices = run(dir.path(), &["devices"]);
+    assert_eq!(devices.status.code(), Some(0));
+    assert!(String::from_utf8_lossy(&devices.stdout).contains("simulated"));
+}
+
+/// Killed without any warning while it records: the file opens and holds what is older than a second.
+#[cfg(unix)]
+#[test]
+fn a_recording_whose_program_is_killed_holds_all_but_the_last_second() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = scene_that_lasts(dir.path());
+    let mut child = snapin(dir.path())
+        .args(["live", scene.to_str().unwrap(), "--out", "rec"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let file = dir.path().join("rec/session-001.mcap");
+    let steps = || {
+        let bytes = std::fs::read(&file).unwrap_or_default();
+        mcap_file::read(&bytes).map_or(0, |read| read.messages.len())
+    };
+    let mut before = 0;
+    while before < 500 {
+        assert!(child.try_wait().unwrap().is_none(), "it ended too early");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        before = steps();
+    }
+    std::thread::sleep(std::time::Duration::from_secs(1));
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let read = mcap_file::read(&std::fs::read(&file).unwrap()).unwrap();
+    assert!(!read.is_whole);
+    // Something younger than a second was there when it was killed.
+    assert!(read.messages.len() > before, "{}", read.messages.len());
+    let numbers: Vec<u64> = read.messages.iter().map(|m| m.step).collect();
+    assert!(numbers.iter().enumerate().all(|(k, n)| *n == k as u64));
+}
+
+/// Ctrl-C is how a live session ends: what was felt is told and kept.
+#[cfg(unix)]
+#[test]
+fn ctrl_c_ends_a_live_session_well() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = scene_that_lasts(dir.path());
+    let child = snapin(dir.path())
+        .args(["live", scene.to_str().unwrap(), "--out", "rec", "--json"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let file = dir.path().join("rec/session-001.mcap");
+    while std::fs::metadata(&file).map_or(0, |m| m.len()) < 100_000 {
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    let killed = Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status()
+        .unwrap();
+    assert!(killed.success());
+    let output = child.wait_with_output().unwrap();
+    let err = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{err}");
+    let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let read = mcap_file::read(&std::fs::read(&file).unwrap()).unwrap();
+    assert!(read.is_whole);
+    assert_eq!(told["recorded_steps"], read.messages.len());
 }

@@ -67,13 +67,13 @@ fn with_all_free_it_draws_the_full_shape_and_with_none_a_near_one_at_the_same_fo
                 "forces do not depend on the free set"
             );
         }
-        let u = full.update(&engine).unwrap().to_vec();
+        let u = full.update(engine.active_contacts()).unwrap().to_vec();
         let difference = |other: &[f64]| -> f64 {
             let pairs: Vec<f64> = u.iter().zip(other).map(|(a, b)| a - b).collect();
             largest(&pairs)
         };
-        let of_all = difference(shape_all.update(&engine_all).unwrap());
-        let of_none = difference(shape_none.update(&engine_none).unwrap());
+        let of_all = difference(shape_all.update(engine_all.active_contacts()).unwrap());
+        let of_none = difference(shape_none.update(engine_none.active_contacts()).unwrap());
         // Free nodes take some updates to be chosen and to move.
         if k > 60 && report.contacts > 0 {
             worst_all = worst_all.max(of_all / largest(&u));

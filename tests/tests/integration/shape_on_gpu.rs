@@ -127,7 +127,7 @@ fn without_waiting_the_shape_arrives_later() {
         }
         assert!(engine.active_contacts().len() > 1);
         let exact = shape_on_processor(&part, &scene)
-            .update(&engine)
+            .update(engine.active_contacts())
             .unwrap()
             .to_vec();
         let first = shape.update(engine.active_contacts()).unwrap();

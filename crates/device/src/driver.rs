@@ -174,5 +174,14 @@ pub fn open(name: &str) -> Result<Opened, Unavailable> {
             ),
         });
     };
-    family.open(place)
+    let opened = family.open(place)?;
+    match opened.device.limits().check() {
+        Ok(()) => Ok(opened),
+        Err(error) => Err(Unavailable::Failed {
+            reason: format!(
+                "{} reports limits that no device has: {error}",
+                opened.device.name()
+            ),
+        }),
+    }
 }

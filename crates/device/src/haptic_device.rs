@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 use glamx::DPose3;
 
-use crate::error::DeviceError;
+use crate::error::{DeviceError, check_setting};
 use crate::wrench::Wrench;
 
 /// What a device reports of its handle at one time.
@@ -173,6 +173,63 @@ impl Limits {
             coulomb_friction: None,
         }
     }
+
+    /// Are these limits that a haptic device can have?
+    ///
+    /// What a driver was told by a library or a server is judged by this before it becomes a guard's limit. A peak
+    /// force of 0 (devices for input alone) passes; so does whatever is `None`.
+    ///
+    /// # Errors
+    /// The first limit that is not finite, negative or beyond every device, by its field's name.
+    pub fn check(&self) -> Result<(), DeviceError> {
+        for half_extent in self.workspace_half_extents.to_array() {
+            check_setting(
+                "workspace_half_extents",
+                half_extent,
+                half_extent > 0.0 && half_extent <= 10.0,
+                "above 0 and at most 10 m",
+            )?;
+        }
+        let (peak, continuous) = (self.peak_force, self.continuous_force);
+        check_setting(
+            "peak_force",
+            peak,
+            (0.0..=1000.0).contains(&peak),
+            "from 0 to 1000 N",
+        )?;
+        check_setting(
+            "continuous_force",
+            continuous,
+            continuous >= 0.0 && continuous <= peak && (continuous > 0.0 || peak == 0.0),
+            "above 0 and at most the peak force (N), or 0 with it",
+        )?;
+        let ranges = [
+            ("peak_torque", Some(self.peak_torque), 100.0),
+            ("position_resolution", Some(self.position_resolution), 0.01),
+            ("force_resolution", Some(self.force_resolution), 10.0),
+            ("rotation_resolution", Some(self.rotation_resolution), 0.1),
+            ("max_stiffness", self.max_stiffness, 1e6),
+            (
+                "max_rotational_stiffness",
+                self.max_rotational_stiffness,
+                1e5,
+            ),
+            ("max_damping", self.max_damping, 1e4),
+            ("damping", self.damping, 1e4),
+            ("coulomb_friction", self.coulomb_friction, 100.0),
+        ];
+        for (name, value, most) in ranges {
+            let value = value.unwrap_or(0.0);
+            let is_allowed = (0.0..=most).contains(&value);
+            check_setting(
+                name,
+                value,
+                is_allowed,
+                "from 0 to what a device can have (SI)",
+            )?;
+        }
+        Ok(())
+    }
 }
 
 /// A device that reports the pose of a handle and renders a wrench on it.
@@ -207,3 +264,6 @@ pub trait HapticDevice: Send {
     /// failure; must not fail.
     fn stop(&mut self);
 }
+
+#[cfg(test)]
+mod tests;

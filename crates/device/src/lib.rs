@@ -96,8 +96,11 @@ pub use hand::{HandSettings, SimulatedHand};
 pub use haptic_device::{Command, HandPresence, HandleState, HapticDevice, Limits, Readiness};
 pub use histogram::{TimeHistogram, TimeSummary};
 pub use mapping::{Mapping, MappingSettings, Rotation};
-pub use safety::{Safety, SafetyEvents, SafetySettings, Watchdog};
+pub use safety::{
+    Arming, ArmingSettings, HeatingSettings, ObservedEnergy, PassivitySettings, PortSettings,
+    Safety, SafetyEvents, SafetySettings, WaitsFor, Watchdog,
+};
 pub use script::{Insertion, Phase, Script, Target};
-pub use servo::{PeriodRecord, Servo, ServoReport, ServoSettings};
+pub use servo::{Answer, PeriodRecord, Servo, ServoReport, ServoSettings};
 pub use velocity::VelocityEstimator;
 pub use wrench::{Wrench, rotation_from_vector, rotation_vector};

@@ -1,108 +1,77 @@
-//! The guard between simulation and hand: limits, rates, samples that cannot be, and stalls.
+//! The guard between simulation and hand.
 //!
-//! No clock is read here: time comes in as a number, so each guard can be provoked in a test.
+//! Samples are judged on the way in, commands on the way out, one stage after the other:
+//!
+//! ```text
+//! device ── sample ──> samples ──> simulation ── answer ──┐
+//!                                                         v
+//!   finite ──> passivity ──> clamp ──> heating ──> slew ──> age ──> arming ──> device
+//! ```
+//!
+//! | stage | what it keeps from the hand |
+//! |---|---|
+//! | `finite` | what is not a number |
+//! | `passivity` | energy that never went in |
+//! | `clamp` | more than the largest force or torque |
+//! | `heating` | the peak force for longer than the motors bear it |
+//! | `slew` | jumps; also the way to zero while samples or commands are rejected |
+//! | `age` | answers that are no longer true |
+//! | `arming` | force on a hand that is not there, or not yet |
+//!
+//! No clock is read here: time comes in as a number, so each stage can be provoked in a test.
 
-use glam::DVec3;
+use glam::DMat3;
 
-use crate::error::{DeviceError, check_not_negative, check_positive};
-use crate::haptic_device::{HandleState, Limits};
-use crate::wrench::{Wrench, limit_length};
+use crate::error::{DeviceError, check_setting};
+use crate::haptic_device::{Command, HandleState};
+use crate::servo::Answer;
+use crate::wrench::Wrench;
 
-/// How far the square of a quaternion's length may be from 1. A device's own rounding to 16 bits gives
-/// 3e-5; beyond 1e-3 the sample is rejected, below it is normalised. Dimensionless.
-const UNIT_TOLERANCE: f64 = 1e-3;
+mod arming;
+mod clamp;
+mod events;
+mod finite;
+pub(crate) mod heating;
+mod passivity;
+mod samples;
+mod settings;
+mod slew;
+mod watchdog;
 
-/// What the guard allows.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SafetySettings {
-    /// Largest force, N. A longer one is shortened in its direction.
-    pub force_max: f64,
-    /// Largest torque, N m. A longer one is shortened in its direction.
-    pub torque_max: f64,
-    /// Largest change of the force, N/s. By default the peak force within 2 ms: slower than a step,
-    /// faster than any fall at a snap. Nominal: the peak force within 1 to 10 ms.
-    pub force_rate_max: f64,
-    /// Largest change of the torque, N m/s. By default the peak torque within 2 ms.
-    pub torque_rate_max: f64,
-    /// Largest speed of the handle, m/s; a sample beyond is rejected. Default 10: no hand on a device
-    /// is faster.
-    pub speed_max: f64,
-    /// Largest angular speed of the handle, rad/s. Default 100.
-    pub angular_speed_max: f64,
-    /// Time in which the largest wrench goes to zero while samples or wrenches are rejected, s.
-    /// Default 0.05.
-    pub decay_s: f64,
-    /// Age at which a wrench is stale, s. Default 0.02: twenty periods at 1 kHz.
-    pub stall_timeout_s: f64,
-    /// Time in which a stale wrench goes to zero, s. Default 0.05.
-    pub stall_ramp_s: f64,
-}
+use arming::{ArmingGate, Seen};
+use clamp::NormClamp;
+use finite::FiniteCheck;
+use heating::Heating;
+use passivity::Passivity;
+use samples::SampleCheck;
+use slew::{Rates, SlewLimit};
+use watchdog::AgeGate;
 
-impl SafetySettings {
-    /// The settings for a device with these limits.
-    #[must_use]
-    pub fn for_limits(limits: &Limits) -> Self {
-        const RISE_S: f64 = 2e-3;
-        Self {
-            force_max: limits.peak_force,
-            torque_max: limits.peak_torque,
-            force_rate_max: limits.peak_force / RISE_S,
-            torque_rate_max: limits.peak_torque / RISE_S,
-            speed_max: 10.0,
-            angular_speed_max: 100.0,
-            decay_s: 0.05,
-            stall_timeout_s: Watchdog::TIMEOUT_S,
-            stall_ramp_s: Watchdog::RAMP_S,
-        }
-    }
-}
+pub use arming::{Arming, ArmingSettings, WaitsFor};
+pub use events::SafetyEvents;
+pub use heating::HeatingSettings;
+pub use passivity::{ObservedEnergy, PassivitySettings, PortSettings};
+pub use settings::SafetySettings;
+pub use watchdog::Watchdog;
 
-/// How often the guard stepped in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct SafetyEvents {
-    /// Samples that never came: the device failed to read.
-    pub samples_missing: u64,
-    /// Samples with a number that is not finite.
-    pub samples_non_finite: u64,
-    /// Samples whose quaternion is not of unit length.
-    pub samples_non_unit: u64,
-    /// Samples too far from the last good one, or with too high a velocity.
-    pub samples_too_fast: u64,
-    /// Samples with a time before the last good one's.
-    pub samples_back_in_time: u64,
-    /// Wrenches from the simulation that were not finite.
-    pub wrenches_non_finite: u64,
-    /// Wrenches shortened to the largest force or torque.
-    pub wrenches_clamped: u64,
-    /// Wrenches held back by the largest rate.
-    pub wrenches_rate_limited: u64,
-    /// Stalls of the loop long enough to make the wrench stale.
-    pub stalls: u64,
-}
-
-impl SafetyEvents {
-    /// Samples rejected for any reason.
-    #[must_use]
-    pub fn samples_rejected(&self) -> u64 {
-        self.samples_missing
-            + self.samples_non_finite
-            + self.samples_non_unit
-            + self.samples_too_fast
-            + self.samples_back_in_time
-    }
-}
-
-/// The guard: keeps the last good sample and the last wrench that was let through.
+/// The guard: the stages in their order, and what went out last.
 ///
 /// While the newest sample is rejected, or the wrench is not finite, the wrench goes to zero along its
 /// direction within `decay_s`; afterwards it comes back no faster than the rate allows.
 #[derive(Debug, Clone)]
 pub struct Safety {
-    settings: SafetySettings,
+    samples: SampleCheck,
+    finite: FiniteCheck,
+    passivity: Option<Passivity>,
+    clamp: NormClamp,
+    heating: Option<Heating>,
+    slew: SlewLimit,
+    age: AgeGate,
+    arming: Option<ArmingGate>,
+    /// For the stiffness beside a wrench, N/m.
+    stiffness_max: f64,
+    /// For what the device lets go by itself while the loop stands still.
     stall: Watchdog,
-    last_good: Option<HandleState>,
-    since_good_s: f64,
-    is_sample_good: bool,
     last_wrench: Wrench,
     events: SafetyEvents,
 }
@@ -113,20 +82,37 @@ impl Safety {
     /// # Errors
     /// Where a setting is not finite or outside its range.
     pub fn new(settings: SafetySettings) -> Result<Self, DeviceError> {
-        check_not_negative("force_max", settings.force_max)?;
-        check_not_negative("torque_max", settings.torque_max)?;
-        check_positive("force_rate_max", settings.force_rate_max)?;
-        check_not_negative("torque_rate_max", settings.torque_rate_max)?;
-        check_positive("speed_max", settings.speed_max)?;
-        check_positive("angular_speed_max", settings.angular_speed_max)?;
-        check_positive("decay_s", settings.decay_s)?;
-        let stall = Watchdog::new(settings.stall_timeout_s, settings.stall_ramp_s)?;
+        let s = &settings;
+        check_setting(
+            "stiffness_max",
+            s.stiffness_max,
+            s.stiffness_max >= 0.0,
+            "0 or above (N/m)",
+        )?;
+        let force = Rates {
+            max: s.force_max,
+            rise: s.force_rate_max,
+            fall: s.force_fall_rate_max,
+        };
+        let torque = Rates {
+            max: s.torque_max,
+            rise: s.torque_rate_max,
+            fall: s.torque_fall_rate_max,
+        };
         Ok(Self {
-            settings,
-            stall,
-            last_good: None,
-            since_good_s: 0.0,
-            is_sample_good: false,
+            samples: SampleCheck::new(s.speed_max, s.angular_speed_max)?,
+            finite: FiniteCheck,
+            passivity: s.passivity.as_ref().map(Passivity::new).transpose()?,
+            clamp: NormClamp {
+                force_max: s.force_max,
+                torque_max: s.torque_max,
+            },
+            heating: s.heating.map(Heating::new).transpose()?,
+            slew: SlewLimit::new(force, torque, s.decay_s)?,
+            age: AgeGate::new(s.answer_timeout_s, s.answer_ramp_s)?,
+            arming: s.arming.map(ArmingGate::new).transpose()?,
+            stiffness_max: s.stiffness_max,
+            stall: Watchdog::new(s.stall_timeout_s, s.stall_ramp_s)?,
             last_wrench: Wrench::ZERO,
             events: SafetyEvents::default(),
         })
@@ -143,73 +129,79 @@ impl Safety {
         time_s: f64,
         elapsed_s: f64,
     ) -> Option<HandleState> {
-        self.since_good_s += elapsed_s.max(0.0);
-        let good = sample.and_then(|s| self.judge(s));
-        self.is_sample_good = good.is_some();
-        if sample.is_none() {
-            self.events.samples_missing += 1;
+        let handle = self
+            .samples
+            .pass(sample, time_s, elapsed_s, &mut self.events);
+        let elapsed_s = elapsed_s.max(0.0);
+        if let Some(heating) = &mut self.heating {
+            heating.feed(self.last_wrench.force, elapsed_s);
         }
-        if good.is_some() {
-            self.last_good = good;
-            self.since_good_s = 0.0;
-            return good;
+        if let (Some(passivity), Some(handle)) = (&mut self.passivity, &handle)
+            && self.samples.is_good()
+        {
+            passivity.observe(handle, &self.last_wrench, elapsed_s);
         }
-        self.last_good.map(|held| HandleState {
-            linear_velocity: DVec3::ZERO,
-            angular_velocity: DVec3::ZERO,
-            time_s,
-            ..held
-        })
+        handle
     }
 
-    /// Judges the simulation's wrench on the handle and returns what may be rendered.
+    /// Judges the simulation's answer and returns what may be rendered.
     ///
     /// `elapsed_s`: the period, which is what the rates and the decay are counted by. The result is
-    /// finite and within the limits for whatever comes in. Real-time: no allocation.
-    pub fn accept_wrench(&mut self, wanted: &Wrench, elapsed_s: f64) -> Wrench {
+    /// finite and within the limits for whatever comes in. Its stiffness is the answer's, weakened as the
+    /// wrench was, and zero where the wrench was cut or changed. Real-time: no allocation.
+    pub fn accept(&mut self, answer: &Answer, elapsed_s: f64) -> Command {
         let elapsed_s = elapsed_s.max(0.0);
-        let is_finite = wanted.is_finite();
-        self.events.wrenches_non_finite += u64::from(!is_finite);
-        if !is_finite || !self.is_sample_good {
-            return self.decay(elapsed_s);
+        let wanted = &answer.command;
+        let is_finite = self.finite.pass(wanted, &mut self.events);
+        let shaped = if is_finite && self.samples.is_good() {
+            self.shape(&wanted.wrench, elapsed_s)
+        } else {
+            self.slew.decay(elapsed_s)
+        };
+        let shaped = self.keep_within(shaped);
+        let gain = self.gate(&shaped, answer.age_s, elapsed_s);
+        self.last_wrench = shaped * gain;
+        let stiffness = if shaped == wanted.wrench {
+            self.limit_stiffness(&wanted.stiffness) * gain
+        } else {
+            DMat3::ZERO
+        };
+        Command {
+            wrench: self.last_wrench,
+            stiffness,
         }
-        let s = &self.settings;
-        let clamped = Wrench::new(
-            limit_length(wanted.force, s.force_max),
-            limit_length(wanted.torque, s.torque_max),
-        );
-        let last = self.last_wrench;
-        let limited = Wrench::new(
-            approach(last.force, clamped.force, s.force_rate_max * elapsed_s),
-            approach(last.torque, clamped.torque, s.torque_rate_max * elapsed_s),
-        );
-        self.events.wrenches_clamped += u64::from(clamped != *wanted);
-        self.events.wrenches_rate_limited += u64::from(limited != clamped);
-        self.last_wrench = limited;
-        limited
+    }
+
+    /// The same for a wrench that was computed now.
+    pub fn accept_wrench(&mut self, wanted: &Wrench, elapsed_s: f64) -> Wrench {
+        self.accept(&(*wanted).into(), elapsed_s).wrench
     }
 
     /// Lets the last wrench go towards zero for `elapsed_s`, and returns it: exactly zero after at most
     /// `decay_s`. Real-time: no allocation.
     pub fn decay(&mut self, elapsed_s: f64) -> Wrench {
-        let s = &self.settings;
-        let share = elapsed_s.max(0.0) / s.decay_s;
-        self.last_wrench = Wrench::new(
-            approach(self.last_wrench.force, DVec3::ZERO, s.force_max * share),
-            approach(self.last_wrench.torque, DVec3::ZERO, s.torque_max * share),
-        );
+        let decayed = self.slew.decay(elapsed_s.max(0.0));
+        let gain = self.arming.as_ref().map_or(1.0, ArmingGate::gain);
+        self.last_wrench = self.keep_within(decayed) * (self.age.gain() * gain);
         self.last_wrench
     }
 
     /// Says that the last wrench was rendered for `age_s` without a new one.
     ///
     /// Beyond the timeout the device has faded it by itself (see [`HapticDevice`](crate::HapticDevice)),
-    /// so the next one rises from there. Real-time: no allocation.
+    /// so the next one rises from there; once it is gone, the force must be armed again. Real-time: no
+    /// allocation.
     pub fn after_gap(&mut self, age_s: f64) {
         let gain = self.stall.gain_at_age(age_s);
         if gain < 1.0 {
             self.events.stalls += 1;
+            self.slew.fade(gain);
             self.last_wrench = self.last_wrench * gain;
+        }
+        if gain == 0.0
+            && let Some(arming) = &mut self.arming
+        {
+            arming.stalled(&mut self.events);
         }
     }
 
@@ -225,131 +217,93 @@ impl Safety {
         self.events
     }
 
-    /// The sample with its quaternion normalised, or nothing, with the reason counted.
-    fn judge(&mut self, sample: &HandleState) -> Option<HandleState> {
-        if !sample.is_finite() {
-            self.events.samples_non_finite += 1;
-            return None;
-        }
-        let off_unit = (sample.pose.rotation.length_squared() - 1.0).abs();
-        // A length that overflows is not unit either.
-        if off_unit.is_nan() || off_unit > UNIT_TOLERANCE {
-            self.events.samples_non_unit += 1;
-            return None;
-        }
-        let mut good = *sample;
-        if off_unit > 4.0 * f64::EPSILON {
-            good.pose.rotation = good.pose.rotation.normalize();
-        }
-        let s = &self.settings;
-        let mut is_too_fast = good.linear_velocity.length() > s.speed_max
-            || good.angular_velocity.length() > s.angular_speed_max;
-        if let Some(last) = &self.last_good {
-            if good.time_s < last.time_s {
-                self.events.samples_back_in_time += 1;
-                return None;
-            }
-            let way = (good.pose.translation - last.pose.translation).length();
-            let turn = last.pose.rotation.angle_between(good.pose.rotation);
-            is_too_fast |= way > s.speed_max * self.since_good_s
-                || turn > s.angular_speed_max * self.since_good_s;
-        }
-        if is_too_fast {
-            self.events.samples_too_fast += 1;
-            return None;
-        }
-        Some(good)
-    }
-}
-
-/// From `from` towards `to`, by no more than `step` in length.
-fn approach(from: DVec3, to: DVec3, step: f64) -> DVec3 {
-    let way = to - from;
-    if way.length() <= step {
-        to
-    } else {
-        from + limit_length(way, step)
-    }
-}
-
-/// Fades what has not been renewed: full until the timeout, then smoothly to zero.
-///
-/// ```text
-/// gain
-///  1 ───────────╮
-///               │╲         1 − (3x² − 2x³),  x = (age − timeout)/ramp
-///  0            │ ╰──────
-///            timeout  timeout + ramp        age
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Watchdog {
-    timeout_s: f64,
-    ramp_s: f64,
-    fed_s: f64,
-}
-
-impl Watchdog {
-    /// Age at which a wrench is stale by default, s: twenty periods at 1 kHz.
-    pub const TIMEOUT_S: f64 = 0.02;
-
-    /// Time in which it then goes to zero by default, s.
-    pub const RAMP_S: f64 = 0.05;
-
-    /// A watchdog fed at time 0.
-    ///
-    /// # Errors
-    /// Where a time is not finite or not above 0.
-    pub fn new(timeout_s: f64, ramp_s: f64) -> Result<Self, DeviceError> {
-        check_positive("stall_timeout_s", timeout_s)?;
-        check_positive("stall_ramp_s", ramp_s)?;
-        Ok(Self {
-            timeout_s,
-            ramp_s,
-            fed_s: 0.0,
-        })
-    }
-
-    /// That of a link: full for 20 ms, gone after 50 ms.
+    /// How far arming is.
     #[must_use]
-    pub(crate) fn for_link() -> Self {
-        Self {
-            timeout_s: Self::TIMEOUT_S,
-            ramp_s: 0.03,
-            fed_s: 0.0,
-        }
+    pub fn arming(&self) -> Arming {
+        self.arming
+            .as_ref()
+            .map_or(Arming::NotAsked, ArmingGate::state)
     }
 
-    /// Says that a new value came at `time_s`, s.
-    pub fn feed(&mut self, time_s: f64) {
-        self.fed_s = time_s;
-    }
-
-    /// Factor in [0, 1] for the value at `time_s`, s. A time before the last feeding counts as a new
-    /// beginning; a time that is not a number gives 0.
-    pub fn gain(&mut self, time_s: f64) -> f64 {
-        if time_s < self.fed_s {
-            self.fed_s = time_s;
-        }
-        self.gain_at_age(time_s - self.fed_s)
-    }
-
-    /// Factor in [0, 1] for a value of this age, s.
+    /// The energy observed at the handle; 0 where none is.
     #[must_use]
-    pub fn gain_at_age(&self, age_s: f64) -> f64 {
-        if age_s.is_nan() {
-            return 0.0;
-        }
-        let x = ((age_s - self.timeout_s) / self.ramp_s).clamp(0.0, 1.0);
-        1.0 - x * x * (3.0 - 2.0 * x)
+    pub fn energy(&self) -> ObservedEnergy {
+        self.passivity
+            .as_ref()
+            .map_or_else(ObservedEnergy::default, Passivity::energy)
     }
-}
 
-impl Default for Watchdog {
-    fn default() -> Self {
-        Self {
-            timeout_s: Self::TIMEOUT_S,
-            ramp_s: Self::RAMP_S,
-            fed_s: 0.0,
+    /// The lowest energies observed, J, 0 or below: the most that came out beyond what had gone in.
+    #[must_use]
+    pub fn lowest_energy(&self) -> ObservedEnergy {
+        self.passivity
+            .as_ref()
+            .map_or_else(ObservedEnergy::default, Passivity::lowest)
+    }
+
+    /// The stages that change a good wrench.
+    fn shape(&mut self, wanted: &Wrench, elapsed_s: f64) -> Wrench {
+        let events = &mut self.events;
+        let passive = match &self.passivity {
+            Some(passivity) => passivity.pass(wanted, elapsed_s, events),
+            None => *wanted,
+        };
+        let mut limited = self.clamp.pass(&passive, events);
+        if let Some(heating) = &self.heating {
+            limited.force = heating.pass(limited.force, events);
+        }
+        self.slew.pass(&limited, elapsed_s, events)
+    }
+
+    /// What is held must also be within the limits that shrink with time: energy and heat.
+    fn keep_within(&mut self, shaped: Wrench) -> Wrench {
+        let (mut force, mut torque) = (self.clamp.force_max, self.clamp.torque_max);
+        if let Some(passivity) = &self.passivity {
+            let (force_left, torque_left) = passivity.ceilings();
+            (force, torque) = (force.min(force_left), torque.min(torque_left));
+        }
+        if let Some(heating) = &self.heating {
+            force = force.min(heating.allowed());
+        }
+        if force < self.clamp.force_max || torque < self.clamp.torque_max {
+            self.slew.keep_within(force, torque)
+        } else {
+            shaped
+        }
+    }
+
+    /// The factor of the two gates.
+    fn gate(&mut self, shaped: &Wrench, age_s: f64, elapsed_s: f64) -> f64 {
+        let (young, is_stale) = self.age.pass(age_s, elapsed_s);
+        self.events.answers_stale += u64::from(is_stale);
+        let Some(arming) = &mut self.arming else {
+            return young;
+        };
+        let (hand, readiness) = self.samples.condition();
+        let (speed, angular_speed) = self.samples.speeds();
+        let seen = Seen {
+            hand,
+            readiness,
+            silent_s: self.samples.silent_s(),
+            speed,
+            angular_speed,
+            wrench: *shaped,
+        };
+        young * arming.pass(&seen, elapsed_s, &mut self.events)
+    }
+
+    /// The stiffness within the largest.
+    fn limit_stiffness(&mut self, wanted: &DMat3) -> DMat3 {
+        let squares: f64 = wanted.to_cols_array().iter().map(|x| x * x).sum();
+        let norm = (squares / 3.0).sqrt();
+        if norm <= self.stiffness_max {
+            return *wanted;
+        }
+        self.events.stiffness_limited += 1;
+        if norm.is_finite() {
+            *wanted * (self.stiffness_max / norm)
+        } else {
+            DMat3::ZERO
         }
     }
 }

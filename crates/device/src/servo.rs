@@ -4,10 +4,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::clock::Clock;
 use crate::error::DeviceError;
-use crate::haptic_device::{HandleState, HapticDevice, Limits};
+use crate::haptic_device::{Command, HandleState, HapticDevice, Limits};
 use crate::histogram::{TimeHistogram, TimeSummary};
-use crate::safety::{Safety, SafetyEvents, SafetySettings};
+use crate::safety::{Arming, ObservedEnergy, Safety, SafetyEvents, SafetySettings};
 use crate::wrench::Wrench;
+
+mod answer;
+
+pub use answer::Answer;
 
 /// What the loop is allowed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,18 +19,31 @@ pub struct ServoSettings {
     /// The guard between simulation and hand.
     pub safety: SafetySettings,
     /// Failures of the device in a row after which it is given up, in periods. Default 100: a tenth of
-    /// a second at 1 kHz, within which the wrench has gone to zero.
-    pub failures_max: u32,
+    /// a second at 1 kHz, within which the wrench has gone to zero. `None`: never; the loop goes on with
+    /// zero force, and the force is armed again when the device is back.
+    pub failures_max: Option<u32>,
 }
 
 impl ServoSettings {
-    /// The settings for a device with these limits.
+    /// The settings for a scripted session on a simulated device with these limits.
     #[must_use]
     pub fn for_limits(limits: &Limits) -> Self {
         Self {
             safety: SafetySettings::for_limits(limits),
-            failures_max: 100,
+            failures_max: Some(100),
         }
+    }
+
+    /// The settings for a live session on a device with these limits: every guard is on, and a device that
+    /// is lost is waited for.
+    ///
+    /// # Errors
+    /// Where the limits are none that a device can have ([`Limits::check`]), by name.
+    pub fn live(limits: &Limits) -> Result<Self, DeviceError> {
+        Ok(Self {
+            safety: SafetySettings::live(limits)?,
+            failures_max: None,
+        })
     }
 }
 
@@ -51,6 +68,10 @@ pub struct PeriodRecord {
     pub is_late: bool,
     /// Scheduled times that had gone by unused before this period.
     pub skipped: u64,
+    /// How far arming is; what the user should do is in its text.
+    pub arming: Arming,
+    /// Energy observed at the handle.
+    pub energy: ObservedEnergy,
 }
 
 /// What came of a run.
@@ -76,19 +97,25 @@ pub struct ServoReport {
     pub write_failures: u64,
     /// How often the guard stepped in.
     pub safety: SafetyEvents,
+    /// How far arming is.
+    pub arming: Arming,
+    /// The lowest energies observed at the handle, J, 0 or below: the most that came out beyond what had
+    /// gone in.
+    pub lowest_energy: ObservedEnergy,
 }
 
 /// The loop between a device and a simulation, on a clock.
 ///
 /// The simulation is a closure from the state of the handle to the wrench *on the handle* about the
-/// handle point. It is called once a period as soon as there has been a good sample. In real time a
+/// handle point, or to an [`Answer`] that also says how the force goes on and how old it is. It is called
+/// once a period as soon as there has been a good sample. In real time a
 /// period that ends late is counted and its successor waits for the next scheduled time; nothing is
 /// made up for.
 #[derive(Debug, Clone)]
 pub struct Servo<C> {
     clock: C,
     safety: Safety,
-    failures_max: u32,
+    failures_max: Option<u32>,
     failures: u32,
     periods: u64,
     missed_deadlines: u64,
@@ -132,11 +159,11 @@ impl<C: Clock> Servo<C> {
     ///
     /// # Errors
     /// [`DeviceError::Lost`] when the device fails too often in a row.
-    pub fn run(
+    pub fn run<A: Into<Answer>>(
         &mut self,
         device: &mut dyn HapticDevice,
         stop: &AtomicBool,
-        simulate: impl FnMut(&HandleState) -> Wrench,
+        simulate: impl FnMut(&HandleState) -> A,
     ) -> Result<ServoReport, DeviceError> {
         self.run_while(device, |_| !stop.load(Ordering::Relaxed), simulate)
     }
@@ -145,11 +172,11 @@ impl<C: Clock> Servo<C> {
     ///
     /// # Errors
     /// [`DeviceError::Lost`] when the device fails too often in a row.
-    pub fn run_periods(
+    pub fn run_periods<A: Into<Answer>>(
         &mut self,
         device: &mut dyn HapticDevice,
         periods: u64,
-        simulate: impl FnMut(&HandleState) -> Wrench,
+        simulate: impl FnMut(&HandleState) -> A,
     ) -> Result<ServoReport, DeviceError> {
         let end = self.periods.saturating_add(periods);
         self.run_while(device, |done| done < end, simulate)
@@ -162,10 +189,10 @@ impl<C: Clock> Servo<C> {
     ///
     /// # Errors
     /// [`DeviceError::Lost`] when the device has failed too often in a row.
-    pub fn step(
+    pub fn step<A: Into<Answer>>(
         &mut self,
         device: &mut dyn HapticDevice,
-        simulate: impl FnOnce(&HandleState) -> Wrench,
+        simulate: impl FnOnce(&HandleState) -> A,
     ) -> Result<PeriodRecord, DeviceError> {
         let release = self.clock.wait();
         let period_s = self.clock.period_s();
@@ -178,27 +205,29 @@ impl<C: Clock> Servo<C> {
         let handle = self
             .safety
             .accept_sample(read.as_ref().ok(), release.time_s, elapsed_s);
-        let wrench_on_handle = match &handle {
+        let command = match &handle {
             Some(handle) => {
-                let wanted = simulate(handle);
+                let answer = simulate(handle).into();
                 // One period also after a gap: to the hand the new wrench is one step either way.
-                self.safety.accept_wrench(&wanted, period_s)
+                self.safety.accept(&answer, period_s)
             }
-            None => Wrench::ZERO,
+            None => Command::ZERO,
         };
-        let written = device.write(&wrench_on_handle.into());
+        let written = device.write(&command);
 
         let response_s = self.clock.since_release_s();
         let record = PeriodRecord {
             index: release.index,
             time_s: release.time_s,
             handle,
-            wrench_on_handle,
+            wrench_on_handle: command.wrench,
             wake_delay_s: release.wake_delay_s,
             compute_s: response_s - release.wake_delay_s,
             response_s,
             is_late: response_s > period_s,
             skipped: release.skipped,
+            arming: self.safety.arming(),
+            energy: self.safety.energy(),
         };
         self.count(&record);
         self.count_failures(read.err(), written.err())?;
@@ -234,6 +263,8 @@ impl<C: Clock> Servo<C> {
             read_failures: self.read_failures,
             write_failures: self.write_failures,
             safety: self.safety.events(),
+            arming: self.safety.arming(),
+            lowest_energy: self.safety.lowest_energy(),
         }
     }
 
@@ -243,11 +274,11 @@ impl<C: Clock> Servo<C> {
         &self.response
     }
 
-    fn run_while(
+    fn run_while<A: Into<Answer>>(
         &mut self,
         device: &mut dyn HapticDevice,
         mut goes_on: impl FnMut(u64) -> bool,
-        mut simulate: impl FnMut(&HandleState) -> Wrench,
+        mut simulate: impl FnMut(&HandleState) -> A,
     ) -> Result<ServoReport, DeviceError> {
         let device = StopOnDrop(device);
         while goes_on(self.periods) {
@@ -283,8 +314,8 @@ impl<C: Clock> Servo<C> {
             self.failures = 0;
             return Ok(());
         };
-        self.failures += 1;
-        if self.failures >= self.failures_max {
+        self.failures = self.failures.saturating_add(1);
+        if self.failures_max.is_some_and(|max| self.failures >= max) {
             return Err(DeviceError::Lost {
                 failures: self.failures,
                 last: Box::new(last),

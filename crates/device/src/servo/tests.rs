@@ -236,7 +236,7 @@ fn failed_read_is_survived_with_the_last_pose() {
 #[test]
 fn device_that_stays_away_ends_the_loop_and_is_stopped() {
     let mut settings = ServoSettings::for_limits(&Limits::virtuose_6d());
-    settings.failures_max = 5;
+    settings.failures_max = Some(5);
     let mut servo = Servo::new(Driven::new(T).unwrap(), settings).unwrap();
     let mut device = Bench::at_origin();
     device.is_writable = false;
@@ -257,7 +257,7 @@ fn device_is_stopped_when_the_simulation_panics() {
     let mut servo = servo(Driven::new(T).unwrap());
     let mut device = Bench::at_origin();
     let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-        servo.run_periods(&mut device, 3, |_| panic!("provoked"))
+        servo.run_periods(&mut device, 3, |_| -> Wrench { panic!("provoked") })
     }));
     assert!(outcome.is_err());
     assert_eq!(device.stops, 1);

@@ -6,6 +6,10 @@ use glamx::DPose3;
 use crate::error::{DeviceError, check_setting};
 use crate::wrench::{Wrench, rotation_from_vector, rotation_vector};
 
+mod choice;
+
+pub use choice::{ChosenCoupling, CouplingWish};
+
 /// Largest stiffness that is accepted, N/m and N m/rad. Above it the coupling is rigid for every part
 /// of any size, and 1/K begins to vanish beside the part's compliance in 64-bit numbers.
 pub const STIFFNESS_MAX: f64 = 1e12;
@@ -180,117 +184,4 @@ fn diagonal(translational: f64, rotational: f64) -> [[f64; 6]; 6] {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn target() -> DPose3 {
-        DPose3::new(DVec3::new(0.1, -0.2, 0.3), DVec3::new(0.4, 1.0, -0.7))
-    }
-
-    #[test]
-    fn deviation_of_pose_from_deviation_is_the_deviation() {
-        for scale in [0.0, 1e-9, 1e-3, 0.5, 1.0] {
-            // |phi| = 3.04 < pi at scale 1.
-            let e = [0.01, -0.02, 0.03, 2.0, -1.0, 2.06].map(|x| x * scale);
-            let tool = VirtualCoupling::pose_from_deviation(&target(), &e);
-            let back = VirtualCoupling::deviation(&target(), &tool);
-            for (a, b) in e.iter().zip(back) {
-                // Positions of 0.3 m carry 6e-17 m each, rotations of unit quaternions 2e-16 rad;
-                // near pi the angle is the worst conditioned.
-                assert!((a - b).abs() < 4e-15, "{e:?} {back:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn deviation_turns_with_the_common_frame() {
-        let world = DPose3::new(DVec3::new(1.0, 2.0, 3.0), DVec3::new(-0.3, 0.8, 0.1));
-        let e = [0.01, 0.02, -0.01, 0.1, -0.2, 0.3];
-        let tool = VirtualCoupling::pose_from_deviation(&target(), &e);
-        let seen = VirtualCoupling::deviation(&(world * target()), &(world * tool));
-        let d = world.rotation * DVec3::new(e[0], e[1], e[2]);
-        let phi = world.rotation * DVec3::new(e[3], e[4], e[5]);
-        let expected = [d.x, d.y, d.z, phi.x, phi.y, phi.z];
-        for (a, b) in expected.iter().zip(seen) {
-            assert!((a - b).abs() < 2e-15);
-        }
-    }
-
-    #[test]
-    fn wrench_on_tool_pulls_back_and_balances_the_handle() {
-        let coupling = VirtualCoupling::new(1000.0, 5.0).unwrap();
-        let e = [0.001, 0.0, 0.0, 0.0, 0.0, 0.1];
-        let on_tool = coupling.wrench_on_tool(&e);
-        assert_eq!(on_tool.to_array(), [-1.0, 0.0, 0.0, 0.0, 0.0, -0.5]);
-        let on_handle = coupling.wrench_on_handle(&e);
-        assert_eq!(on_tool + on_handle, Wrench::ZERO);
-    }
-
-    #[test]
-    fn wrench_is_the_gradient_of_the_energy() {
-        // V = k_t |d|^2 / 2 + k_r |phi|^2 / 2; a rotation of the tool by small a changes V by k_r phi.a.
-        let coupling = VirtualCoupling::new(800.0, 3.0).unwrap();
-        let energy = |e: &[f64; 6]| {
-            400.0 * (e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
-                + 1.5 * (e[3] * e[3] + e[4] * e[4] + e[5] * e[5])
-        };
-        let e = [0.01, -0.02, 0.005, 0.9, -1.1, 0.4];
-        let tool = VirtualCoupling::pose_from_deviation(&target(), &e);
-        let wrench = coupling.wrench_on_tool(&e).to_array();
-        let h = 1e-6;
-        for axis in 0..6 {
-            let moved = |by: f64| {
-                let mut step = [0.0; 6];
-                step[axis] = by;
-                let pose = VirtualCoupling::pose_from_deviation(&tool, &step);
-                energy(&VirtualCoupling::deviation(&target(), &pose))
-            };
-            let slope = (moved(h) - moved(-h)) / (2.0 * h);
-            assert!((slope + wrench[axis]).abs() < 1e-7, "axis {axis}");
-        }
-    }
-
-    #[test]
-    fn compliance_inverts_stiffness_over_the_whole_range() {
-        for k in [0.0, 1e-3, 1.0, 1e4, 1e12] {
-            let coupling = VirtualCoupling::new(k, k).unwrap();
-            let (stiff, soft) = (coupling.stiffness(), coupling.compliance());
-            for (i, row) in stiff.iter().enumerate() {
-                for (j, expected) in (0..6).map(|j| (j, if i == j { 1.0 } else { 0.0 })) {
-                    let product: f64 = row.iter().zip(&soft).map(|(k, c)| k * c[j]).sum();
-                    assert!((product - expected).abs() < 1e-15);
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn stiffness_outside_the_range_is_refused_by_name() {
-        for bad in [-1.0, 2e12, f64::NAN, f64::INFINITY] {
-            assert!(matches!(
-                VirtualCoupling::new(bad, 1.0),
-                Err(DeviceError::InvalidSetting {
-                    name: "translational_stiffness",
-                    ..
-                })
-            ));
-            assert!(matches!(
-                VirtualCoupling::new(1.0, bad),
-                Err(DeviceError::InvalidSetting {
-                    name: "rotational_stiffness",
-                    ..
-                })
-            ));
-        }
-    }
-
-    #[test]
-    fn stability_bounds_have_their_textbook_values() {
-        assert!((largest_stiffness_for_damping(5.0, 0.0, 1e-3) - 1e4).abs() < 1e-9);
-        assert!((largest_stiffness_for_damping(5.0, -3.0, 1e-3) - 4e3).abs() < 1e-9);
-        assert_eq!(largest_stiffness_for_damping(1.0, 2.0, 1e-3), 0.0);
-        assert_eq!(largest_stiffness_for_damping(1.0, 0.0, 0.0), 0.0);
-        assert_eq!(largest_stiffness_for_friction(0.5, 1e-4), 1e4);
-        assert_eq!(largest_stiffness_for_friction(0.5, 0.0), f64::INFINITY);
-    }
-}
+mod tests;

@@ -132,7 +132,7 @@ pub enum Unavailable {
 }
 
 /// All families. Adding one is a file and a line here.
-pub static FAMILIES: &[&dyn Family] = &[];
+pub static FAMILIES: &[&dyn Family] = &[&simulated::Simulations];
 
 /// Every device that is attached and every way that leads to none, with the reason.
 #[must_use]

@@ -4,9 +4,16 @@ use glam::DVec3;
 use glamx::DPose3;
 
 use crate::error::{DeviceError, check_not_negative, check_positive};
-use crate::haptic_device::HandleState;
-use crate::script::{Phase, Script};
+use crate::haptic_device::{HandPresence, HandleState};
+use crate::script::{Insertion, Phase, Script, Target};
 use crate::wrench::{Wrench, rotation_from_vector, rotation_vector};
+
+pub(crate) mod body;
+mod guide;
+
+use body::{Body, HeldBody};
+use guide::Follower;
+pub use guide::Guide;
 
 /// What the hand is like: apparent mass of hand and handle, and the grip between intent and handle.
 ///
@@ -16,7 +23,8 @@ use crate::wrench::{Wrench, rotation_from_vector, rotation_vector};
 /// stiffer grip: the handle lags its script by force/stiffness.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HandSettings {
-    /// Apparent mass of hand and handle, kg, above 0. Default 0.5, nominal 0.1 to 1.
+    /// Apparent mass of hand and handle, kg, above 0; on a device with a body of its own, of the hand
+    /// alone. Default 0.5, nominal 0.1 to 1.
     pub apparent_mass: f64,
     /// Stiffness of the grip, N/m, 0 or above. Default 2000, nominal 100 to 20 000.
     pub grip_stiffness: f64,
@@ -44,7 +52,8 @@ impl Default for HandSettings {
     }
 }
 
-/// A hand that holds the handle and wants it to follow a [`Script`].
+/// A hand that holds the handle and wants it to follow a [`Script`], or a [`Guide`] that is moved from
+/// outside.
 ///
 /// ```text
 /// m dv/dt = k (x* − x) + c (v* − v) + f         J dω/dt = k_r rotvec(R* R⁻¹) + c_r (ω* − ω) + t
@@ -53,8 +62,12 @@ impl Default for HandSettings {
 /// grip (unconditionally stable in k and c) with the wrench of the last period, which is what a device
 /// holds between two writes. The inertia is the same about all axes, so no gyroscopic term arises.
 ///
+/// On a device with a body of its own (`driver/simulated/models.rs`) hand and body move as one, with the
+/// device's damping and dry friction, and exactly for a wrench that is held over the period: there the
+/// edge of stability is wanted, and backward Euler would damp it away.
+///
 /// The same wrenches give the same bits.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct SimulatedHand {
     settings: HandSettings,
     script: Script,
@@ -63,6 +76,8 @@ pub struct SimulatedHand {
     pose: DPose3,
     linear_velocity: DVec3,
     angular_velocity: DVec3,
+    guide: Option<Follower>,
+    body: Option<HeldBody>,
 }
 
 impl SimulatedHand {
@@ -89,7 +104,53 @@ impl SimulatedHand {
             pose: script.start(),
             linear_velocity: DVec3::ZERO,
             angular_velocity: DVec3::ZERO,
+            guide: None,
+            body: None,
         })
+    }
+
+    /// A hand that wants to stay where it is.
+    ///
+    /// # Errors
+    /// Where a setting, the pose or the period is outside its range.
+    pub fn resting(
+        settings: HandSettings,
+        start: DPose3,
+        period_s: f64,
+    ) -> Result<Self, DeviceError> {
+        let script = Script::new(&Insertion {
+            start,
+            direction: DVec3::NEG_Z,
+            speed: 1.0,
+            travel: 0.0,
+            hold_s: 0.0,
+            retract: false,
+        })?;
+        Self::new(settings, script, period_s)
+    }
+
+    /// A hand whose wanted pose is set from outside, from whatever thread: by mouse and keyboard, or a test.
+    ///
+    /// # Errors
+    /// Where a setting, the pose or the period is outside its range.
+    pub fn guided(
+        settings: HandSettings,
+        start: DPose3,
+        period_s: f64,
+    ) -> Result<(Guide, Self), DeviceError> {
+        let mut hand = Self::resting(settings, start, period_s)?;
+        let (guide, follower) = guide::pair(start);
+        hand.guide = Some(follower);
+        Ok((guide, hand))
+    }
+
+    /// Gives the hand a device's body to hold.
+    ///
+    /// # Errors
+    /// Where grip and body together cannot be computed with at this period.
+    pub(crate) fn take(&mut self, body: &Body) -> Result<(), DeviceError> {
+        self.body = Some(HeldBody::new(body, &self.settings, self.period_s)?);
+        Ok(())
     }
 
     /// Advances the hand by one period under a constant wrench on the handle (about the handle point).
@@ -98,9 +159,20 @@ impl SimulatedHand {
     pub fn step(&mut self, wrench_on_handle: &Wrench) {
         debug_assert!(wrench_on_handle.is_finite());
         self.steps += 1;
+        if let Some(follower) = &mut self.guide {
+            follower.advance(self.period_s);
+        }
+        let target = self.target();
+        if self.body.is_some() {
+            self.step_with_body(&target, wrench_on_handle);
+        } else {
+            self.step_alone(&target, wrench_on_handle);
+        }
+    }
+
+    fn step_alone(&mut self, target: &Target, wrench_on_handle: &Wrench) {
         let h = self.period_s;
-        let s = &self.settings;
-        let target = self.script.target(self.time_s());
+        let s = &self.grip();
 
         // (m + h c + h² k) v₁ = m v₀ + h (k (x*₁ − x₀) + c v*₁ + f)
         let (m, k, c) = (s.apparent_mass, s.grip_stiffness, s.grip_damping);
@@ -124,6 +196,29 @@ impl SimulatedHand {
         );
     }
 
+    fn step_with_body(&mut self, target: &Target, wrench_on_handle: &Wrench) {
+        let is_held = self.is_held();
+        let grip = self.grip();
+        let Some(body) = &self.body else {
+            return;
+        };
+        // Offsets from the target, which stands at its end of the period and moves on from there.
+        let pull = wrench_on_handle.force + target.linear_velocity * grip.grip_damping;
+        let offset = self.pose.translation - target.pose.translation;
+        let (way, velocity) = body.translate(is_held, offset, self.linear_velocity, pull);
+
+        let pull = wrench_on_handle.torque + target.angular_velocity * grip.grip_rotational_damping;
+        let offset = rotation_vector(self.pose.rotation * target.pose.rotation.inverse());
+        let (turn, angular_velocity) = body.turn(is_held, offset, self.angular_velocity, pull);
+
+        self.linear_velocity = velocity;
+        self.angular_velocity = angular_velocity;
+        self.pose = DPose3::from_parts(
+            self.pose.translation + way,
+            (rotation_from_vector(turn) * self.pose.rotation).normalize(),
+        );
+    }
+
     /// Stops the handle at a mechanical limit: `position` is where it is held (m); the velocity into
     /// the limit is taken away on each axis that was moved.
     pub(crate) fn stop_at(&mut self, position: DVec3) {
@@ -135,8 +230,8 @@ impl SimulatedHand {
     /// Wrench of the hand on the handle, about the handle point, N and N m: the force of the push.
     #[must_use]
     pub fn wrench_of_hand(&self) -> Wrench {
-        let s = &self.settings;
-        let target = self.script.target(self.time_s());
+        let s = &self.grip();
+        let target = self.target();
         let twist = rotation_vector(target.pose.rotation * self.pose.rotation.inverse());
         Wrench::new(
             (target.pose.translation - self.pose.translation) * s.grip_stiffness
@@ -153,6 +248,11 @@ impl SimulatedHand {
             linear_velocity: self.linear_velocity,
             angular_velocity: self.angular_velocity,
             time_s: self.time_s(),
+            hand: self
+                .guide
+                .as_ref()
+                .map_or(HandPresence::Unknown, Follower::hand),
+            buttons: self.guide.as_ref().map_or(0, Follower::buttons),
             ..HandleState::at_rest(self.pose)
         }
     }
@@ -169,7 +269,35 @@ impl SimulatedHand {
         self.period_s
     }
 
-    /// The motion the hand follows.
+    /// Where the hand wants the handle now.
+    fn target(&self) -> Target {
+        match &self.guide {
+            Some(follower) => follower.target(),
+            None => self.script.target(self.time_s()),
+        }
+    }
+
+    fn is_held(&self) -> bool {
+        self.guide
+            .as_ref()
+            .is_none_or(|guide| guide.hand() != HandPresence::Absent)
+    }
+
+    /// The hand as it grips now: a hand that has let go pulls no more.
+    fn grip(&self) -> HandSettings {
+        if self.is_held() {
+            return self.settings;
+        }
+        HandSettings {
+            grip_stiffness: 0.0,
+            grip_damping: 0.0,
+            grip_rotational_stiffness: 0.0,
+            grip_rotational_damping: 0.0,
+            ..self.settings
+        }
+    }
+
+    /// The motion the hand follows; of a guided hand, the rest at its start.
     #[must_use]
     pub fn script(&self) -> &Script {
         &self.script
@@ -183,139 +311,4 @@ impl SimulatedHand {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::script::Insertion;
-
-    fn still() -> Script {
-        Script::new(&Insertion {
-            start: DPose3::IDENTITY,
-            direction: DVec3::X,
-            speed: 1.0,
-            travel: 0.0,
-            hold_s: 100.0,
-            retract: false,
-        })
-        .unwrap()
-    }
-
-    fn hand(settings: HandSettings) -> SimulatedHand {
-        SimulatedHand::new(settings, still(), 1e-3).unwrap()
-    }
-
-    #[test]
-    fn hand_under_constant_wrench_rests_at_wrench_over_stiffness() {
-        // Statics: x = f/k = 4/2000 = 2 mm, angle = t/k_r = 0.4/20 = 0.02 rad.
-        let mut hand = hand(HandSettings::default());
-        let wrench = Wrench::new(DVec3::new(4.0, 0.0, 0.0), DVec3::new(0.0, 0.4, 0.0));
-        for _ in 0..2000 {
-            hand.step(&wrench);
-        }
-        let state = hand.state();
-        assert!((state.pose.translation - DVec3::new(0.002, 0.0, 0.0)).length() < 1e-12);
-        let angle = rotation_vector(state.pose.rotation);
-        assert!((angle - DVec3::new(0.0, 0.02, 0.0)).length() < 1e-12);
-        // At rest the hand carries what the device gives.
-        let sum = hand.wrench_of_hand() + wrench;
-        assert!(sum.force.length() < 1e-9 && sum.torque.length() < 1e-9);
-        assert!((state.time_s - 2.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn hand_falls_freely_without_a_grip() {
-        // m = 0.5 kg, f = 1 N: backward Euler gives x = a h² n(n+1)/2 exactly.
-        let mut hand = hand(HandSettings {
-            grip_stiffness: 0.0,
-            grip_damping: 0.0,
-            ..HandSettings::default()
-        });
-        for _ in 0..100 {
-            hand.step(&Wrench::new(DVec3::Z, DVec3::ZERO));
-        }
-        let expected = 2.0 * 1e-6 * 100.0 * 101.0 / 2.0;
-        assert!((hand.state().pose.translation.z - expected).abs() < 1e-15);
-        assert!((hand.state().linear_velocity.z - 0.2).abs() < 1e-14);
-    }
-
-    #[test]
-    fn hand_with_an_extremely_stiff_grip_stays_bounded_and_finite() {
-        let mut hand = hand(HandSettings {
-            grip_stiffness: 1e12,
-            grip_damping: 1e9,
-            grip_rotational_stiffness: 1e12,
-            grip_rotational_damping: 1e9,
-            ..HandSettings::default()
-        });
-        for k in 0..1000 {
-            let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
-            hand.step(&(Wrench::new(DVec3::ONE, DVec3::ONE) * (35.0 * sign)));
-            let state = hand.state();
-            assert!(state.is_finite());
-            assert!(state.pose.translation.length() < 1e-9);
-        }
-    }
-
-    #[test]
-    fn hand_follows_its_script_within_the_lag_of_its_inertia() {
-        let script = Script::new(&Insertion {
-            start: DPose3::IDENTITY,
-            direction: DVec3::NEG_Z,
-            speed: 0.05,
-            travel: 0.02,
-            hold_s: 0.3,
-            retract: false,
-        })
-        .unwrap();
-        let mut hand = SimulatedHand::new(HandSettings::default(), script, 1e-3).unwrap();
-        // Largest wanted acceleration: 1.5 speed/ramp = 1.5 * 0.05/0.04 = 1.9 m/s²; lag <= m a/k.
-        let bound = 1.2 * 0.5 * 1.9 / 2000.0;
-        for _ in 0..script.periods(1e-3) {
-            hand.step(&Wrench::ZERO);
-            let wanted = script.target(hand.time_s()).pose.translation;
-            assert!((hand.state().pose.translation - wanted).length() < bound);
-        }
-        assert!((hand.state().pose.translation.z + 0.02).abs() < 1e-6);
-        assert_eq!(hand.phase(), Phase::Done);
-    }
-
-    #[test]
-    fn hand_with_the_same_wrenches_gives_the_same_bits() {
-        let run = || {
-            let mut hand = hand(HandSettings::default());
-            for k in 0..500 {
-                let x = f64::from(k);
-                hand.step(&Wrench::new(
-                    DVec3::new(x.sin(), x.cos(), 0.1),
-                    DVec3::new(0.01, -0.02, 0.03) * x.sin(),
-                ));
-            }
-            hand.state()
-        };
-        assert_eq!(run(), run());
-    }
-
-    #[test]
-    fn hand_refuses_each_bad_setting_by_name() {
-        let refused = |change: fn(&mut HandSettings)| {
-            let mut settings = HandSettings::default();
-            change(&mut settings);
-            match SimulatedHand::new(settings, still(), 1e-3) {
-                Err(DeviceError::InvalidSetting { name, .. }) => name,
-                other => panic!("{other:?}"),
-            }
-        };
-        assert_eq!(refused(|s| s.apparent_mass = 0.0), "apparent_mass");
-        assert_eq!(refused(|s| s.grip_stiffness = -1.0), "grip_stiffness");
-        assert_eq!(refused(|s| s.grip_damping = f64::NAN), "grip_damping");
-        assert_eq!(refused(|s| s.apparent_inertia = -1.0), "apparent_inertia");
-        assert_eq!(
-            refused(|s| s.grip_rotational_stiffness = f64::INFINITY),
-            "grip_rotational_stiffness"
-        );
-        assert_eq!(
-            refused(|s| s.grip_rotational_damping = -1.0),
-            "grip_rotational_damping"
-        );
-        assert!(SimulatedHand::new(HandSettings::default(), still(), 0.0).is_err());
-    }
-}
+mod tests;

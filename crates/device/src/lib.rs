@@ -72,6 +72,7 @@
 )]
 
 pub mod driver;
+pub mod stability;
 
 mod clock;
 mod coupling;
@@ -88,11 +89,12 @@ mod wrench;
 
 pub use clock::{AsFastAsPossible, Clock, Driven, RealTime, Release};
 pub use coupling::{
-    STIFFNESS_MAX, VirtualCoupling, largest_stiffness_for_damping, largest_stiffness_for_friction,
+    ChosenCoupling, CouplingWish, STIFFNESS_MAX, VirtualCoupling, largest_stiffness_for_damping,
+    largest_stiffness_for_friction,
 };
-pub use driver::simulated::{Simulated, SimulatedEvents, SimulatedSettings};
+pub use driver::simulated::{BodySettings, Simulated, SimulatedEvents, SimulatedSettings};
 pub use error::DeviceError;
-pub use hand::{HandSettings, SimulatedHand};
+pub use hand::{Guide, HandSettings, SimulatedHand};
 pub use haptic_device::{Command, HandPresence, HandleState, HapticDevice, Limits, Readiness};
 pub use histogram::{TimeHistogram, TimeSummary};
 pub use mapping::{Mapping, MappingSettings, Rotation};

@@ -1,21 +1,36 @@
 //! A simulated six-axis device, by default with the published figures of a Virtuose 6D, held by a
 //! simulated hand.
+//!
+//! The default has limits and sensors, and no body: the handle is the hand's. The [`Model`]s have one:
+//! mass, damping, dry friction, a late force, and a velocity made of encoder steps.
 
 use glam::DVec3;
 use glamx::DPose3;
 
 use crate::error::{DeviceError, check_not_negative, check_positive, check_setting};
 use crate::hand::SimulatedHand;
+use crate::hand::body::Body;
 use crate::haptic_device::{Command, HandleState, HapticDevice, Limits};
 use crate::safety::Watchdog;
+use crate::safety::heating::{Heating, HeatingSettings};
 use crate::wrench::{Wrench, limit_length, rotation_from_vector, rotation_vector};
+
+mod delay;
+mod family;
+mod models;
+mod velocity;
+
+use delay::DelayLine;
+pub(crate) use family::Simulations;
+pub use models::{MODELS, Model};
+use velocity::VelocityFilter;
 
 /// Longest gap between two reads that is simulated, s; a longer one is a jump of the clock and the
 /// hand does not move in it.
 const GAP_MAX_S: f64 = 1.0;
 
-/// Part of the continuous limit (as mean square) from which the peak force is taken back. Dimensionless.
-const THERMAL_ONSET: f64 = 0.9;
+/// Longest delay of the force that is simulated, periods of the hand.
+const DELAY_STEPS_MAX: f64 = 1e4;
 
 /// What the simulated device is like.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,6 +46,26 @@ pub struct SimulatedSettings {
     /// force, s. Default 60, nominal 10 to 300: the paper gives the two forces and no time; motors of
     /// this size heat within minutes. With 60 s the peak of 35 N lasts 4.6 s before it is taken back.
     pub thermal_window_s: f64,
+    /// The device's body, between handle and hand; `None`: the hand alone moves. Its damping and dry
+    /// friction are those of the limits, none where they are not known.
+    pub body: Option<BodySettings>,
+}
+
+/// What a device's moving parts and its wire are like.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BodySettings {
+    /// Apparent mass at the handle, kg.
+    pub mass: f64,
+    /// Apparent moment of inertia about the handle point, kg m².
+    pub inertia: f64,
+    /// Viscous damping of a turn, N m s/rad.
+    pub rotational_damping: f64,
+    /// Time from a write to its force, s; rounded to periods of the hand.
+    pub delay_s: f64,
+    /// Largest time by which that is exceeded at random, s; the same at each run.
+    pub jitter_s: f64,
+    /// Time constant of the filter that makes a velocity of encoder steps, s.
+    pub velocity_window_s: f64,
 }
 
 impl Default for SimulatedSettings {
@@ -39,6 +74,7 @@ impl Default for SimulatedSettings {
             limits: Limits::virtuose_6d(),
             workspace_centre: None,
             thermal_window_s: 60.0,
+            body: None,
         }
     }
 }
@@ -70,8 +106,9 @@ pub struct SimulatedEvents {
 /// ```text
 /// dS/dt = (F² − S)/τ
 /// ```
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Simulated {
+    name: &'static str,
     settings: SimulatedSettings,
     hand: SimulatedHand,
     workspace_centre: DVec3,
@@ -79,9 +116,17 @@ pub struct Simulated {
     reached_s: Option<f64>,
     rendered: Wrench,
     felt: Wrench,
-    mean_square_force: f64,
+    heating: Heating,
     watchdog: Watchdog,
+    wire: Option<Wire>,
     events: SimulatedEvents,
+}
+
+/// What a body adds to forces and sensors.
+#[derive(Debug)]
+struct Wire {
+    delay: DelayLine,
+    velocity: VelocityFilter,
 }
 
 impl Simulated {
@@ -89,23 +134,25 @@ impl Simulated {
     ///
     /// # Errors
     /// Where a limit or setting is outside its range, or the hand's script leaves the workspace.
-    pub fn new(settings: SimulatedSettings, hand: SimulatedHand) -> Result<Self, DeviceError> {
+    pub fn new(settings: SimulatedSettings, mut hand: SimulatedHand) -> Result<Self, DeviceError> {
         let limits = &settings.limits;
         for half_extent in limits.workspace_half_extents.to_array() {
             check_positive("workspace_half_extents", half_extent)?;
         }
-        check_positive("continuous_force", limits.continuous_force)?;
-        check_setting(
-            "peak_force",
-            limits.peak_force,
-            limits.peak_force.is_finite() && limits.peak_force >= limits.continuous_force,
-            "finite and at least the continuous force (N)",
-        )?;
         check_not_negative("peak_torque", limits.peak_torque)?;
         check_not_negative("position_resolution", limits.position_resolution)?;
         check_not_negative("force_resolution", limits.force_resolution)?;
         check_not_negative("rotation_resolution", limits.rotation_resolution)?;
         check_positive("thermal_window_s", settings.thermal_window_s)?;
+        let heating = Heating::new(HeatingSettings {
+            continuous_force: limits.continuous_force,
+            peak_force: limits.peak_force,
+            time_constant_s: settings.thermal_window_s,
+        })?;
+        let wire = match &settings.body {
+            Some(body) => Some(Wire::new(body, limits, &mut hand)?),
+            None => None,
+        };
 
         let script = hand.script();
         let start = script.start().translation;
@@ -119,15 +166,28 @@ impl Simulated {
             }
         }
         Ok(Self {
+            name: "simulated device",
             settings,
             hand,
             workspace_centre: centre,
             reached_s: None,
             rendered: Wrench::ZERO,
             felt: Wrench::ZERO,
-            mean_square_force: 0.0,
+            heating,
             watchdog: Watchdog::default(),
+            wire,
             events: SimulatedEvents::default(),
+        })
+    }
+
+    /// A device of a named model at rest, held by a hand.
+    ///
+    /// # Errors
+    /// Where the hand's script leaves the model's workspace, or the hand is stepped too rarely for it.
+    pub fn of_model(model: &Model, hand: SimulatedHand) -> Result<Self, DeviceError> {
+        Ok(Self {
+            name: model.name,
+            ..Self::new(model.settings(), hand)?
         })
     }
 
@@ -162,12 +222,13 @@ impl Simulated {
         if gain < 1.0 && self.rendered != Wrench::ZERO {
             self.events.fading += 1;
         }
-        self.felt = self.rendered * gain;
+        let arrived = match &mut self.wire {
+            Some(wire) => wire.delay.step(),
+            None => self.rendered,
+        };
+        self.felt = arrived * gain;
         self.hand.step(&self.felt);
-
-        let share = period_s / (self.settings.thermal_window_s + period_s);
-        self.mean_square_force +=
-            (self.felt.force.length_squared() - self.mean_square_force) * share;
+        self.heating.feed(self.felt.force, period_s);
 
         let half = self.settings.limits.workspace_half_extents;
         let position = self.hand.state().pose.translation;
@@ -176,37 +237,89 @@ impl Simulated {
             self.events.at_workspace_wall += 1;
             self.hand.stop_at(inside);
         }
+        if self.wire.is_some() {
+            let pose = self.encoded();
+            if let Some(wire) = &mut self.wire {
+                wire.velocity.step(&pose, period_s);
+            }
+        }
     }
 
-    /// The force the heat allows now, N.
-    fn allowed_force(&self) -> f64 {
+    /// The pose in steps of the encoders.
+    fn encoded(&self) -> DPose3 {
         let limits = &self.settings.limits;
-        let (peak, continuous) = (limits.peak_force, limits.continuous_force);
-        let heat = self.mean_square_force / (continuous * continuous);
-        let taken_back = ((heat - THERMAL_ONSET) / (1.0 - THERMAL_ONSET)).clamp(0.0, 1.0);
-        peak + (continuous - peak) * taken_back
+        let pose = self.hand.state().pose;
+        let position = round_to(pose.translation, limits.position_resolution);
+        let rotation = if limits.rotation_resolution > 0.0 {
+            let vector = rotation_vector(pose.rotation);
+            rotation_from_vector(round_to(vector, limits.rotation_resolution))
+        } else {
+            pose.rotation
+        };
+        DPose3::from_parts(position, rotation)
     }
 
     /// The state the sensors report.
     fn sensed(&self, time_s: f64) -> HandleState {
-        let limits = &self.settings.limits;
         let mut state = self.hand.state();
-        let position = round_to(state.pose.translation, limits.position_resolution);
-        let rotation = if limits.rotation_resolution > 0.0 {
-            let vector = rotation_vector(state.pose.rotation);
-            rotation_from_vector(round_to(vector, limits.rotation_resolution))
-        } else {
-            state.pose.rotation
-        };
-        state.pose = DPose3::from_parts(position, rotation);
+        state.pose = self.encoded();
         state.time_s = time_s;
+        if let Some(wire) = &self.wire {
+            (state.linear_velocity, state.angular_velocity) = wire.velocity.velocities();
+        }
         state
     }
 }
 
+impl Wire {
+    /// The wire of a body, which the hand takes.
+    fn new(
+        settings: &BodySettings,
+        limits: &Limits,
+        hand: &mut SimulatedHand,
+    ) -> Result<Self, DeviceError> {
+        let damping = limits.damping.unwrap_or(0.0);
+        let coulomb_friction = limits.coulomb_friction.unwrap_or(0.0);
+        check_positive("mass", settings.mass)?;
+        check_positive("inertia", settings.inertia)?;
+        check_not_negative("rotational_damping", settings.rotational_damping)?;
+        check_not_negative("damping", damping)?;
+        check_not_negative("coulomb_friction", coulomb_friction)?;
+        check_positive("velocity_window_s", settings.velocity_window_s)?;
+        hand.take(&Body {
+            mass: settings.mass,
+            inertia: settings.inertia,
+            damping,
+            rotational_damping: settings.rotational_damping,
+            coulomb_friction,
+        })?;
+        let period_s = hand.period_s();
+        Ok(Self {
+            delay: DelayLine::new(
+                steps("delay_s", settings.delay_s, period_s)?,
+                steps("jitter_s", settings.jitter_s, period_s)?,
+            ),
+            velocity: VelocityFilter::new(settings.velocity_window_s, hand.state().pose),
+        })
+    }
+}
+
+/// A time in whole periods.
+fn steps(name: &'static str, time_s: f64, period_s: f64) -> Result<u64, DeviceError> {
+    check_not_negative(name, time_s)?;
+    let steps = (time_s / period_s).round();
+    check_setting(
+        name,
+        time_s,
+        steps <= DELAY_STEPS_MAX,
+        "at most 10 000 periods of the hand (s)",
+    )?;
+    Ok(steps as u64)
+}
+
 impl HapticDevice for Simulated {
     fn name(&self) -> &str {
-        "simulated device"
+        self.name
     }
 
     fn limits(&self) -> &Limits {
@@ -247,7 +360,7 @@ impl HapticDevice for Simulated {
         }
         let limits = &self.settings.limits;
         let peak_force = limit_length(wrench_on_handle.force, limits.peak_force);
-        let allowed = self.allowed_force();
+        let allowed = self.heating.allowed();
         let allowed_force = limit_length(peak_force, allowed);
         let torque = limit_length(wrench_on_handle.torque, limits.peak_torque);
         // To the nearest step, but never beyond the limit.
@@ -259,6 +372,9 @@ impl HapticDevice for Simulated {
         self.events.thermally_limited += u64::from(allowed_force != peak_force);
         self.events.torque_limited += u64::from(torque != wrench_on_handle.torque);
         self.rendered = Wrench::new(force, torque);
+        if let Some(wire) = &mut self.wire {
+            wire.delay.push(self.rendered);
+        }
         self.watchdog.feed(self.hand.time_s());
         Ok(())
     }
@@ -266,6 +382,9 @@ impl HapticDevice for Simulated {
     fn stop(&mut self) {
         self.rendered = Wrench::ZERO;
         self.felt = Wrench::ZERO;
+        if let Some(wire) = &mut self.wire {
+            wire.delay.clear();
+        }
         // The next loop may count its time from anywhere; the hand goes on where it is.
         self.reached_s = None;
     }

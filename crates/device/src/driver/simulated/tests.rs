@@ -248,3 +248,51 @@ fn limits_out_of_range_are_refused_by_name() {
     );
     assert_eq!(refused(|s| s.thermal_window_s = 0.0), "thermal_window_s");
 }
+
+#[test]
+fn device_for_input_alone_renders_nothing_and_works() {
+    let mut settings = SimulatedSettings::default();
+    settings.limits.peak_force = 0.0;
+    settings.limits.continuous_force = 0.0;
+    settings.limits.peak_torque = 0.0;
+    let mut device = device(&insertion(), settings);
+    for k in 0..50 {
+        assert!(device.read(f64::from(k) * T).unwrap().is_finite());
+        let wanted = Wrench::new(DVec3::X * 5.0, DVec3::Y);
+        device.write(&wanted.into()).unwrap();
+        assert_eq!(device.rendered(), Wrench::ZERO);
+    }
+}
+
+#[test]
+fn body_out_of_range_is_refused_by_name() {
+    let refused = |change: fn(&mut SimulatedSettings, &mut BodySettings)| {
+        let mut settings = SimulatedSettings::default();
+        let mut body = MODELS[0].body;
+        change(&mut settings, &mut body);
+        settings.body = Some(body);
+        let script = Script::new(&insertion()).unwrap();
+        let hand = SimulatedHand::new(HandSettings::default(), script, T).unwrap();
+        match Simulated::new(settings, hand) {
+            Err(DeviceError::InvalidSetting { name, .. }) => name,
+            other => panic!("{other:?}"),
+        }
+    };
+    assert_eq!(refused(|_, b| b.mass = 0.0), "mass");
+    assert_eq!(refused(|_, b| b.inertia = f64::NAN), "inertia");
+    assert_eq!(
+        refused(|_, b| b.rotational_damping = -1.0),
+        "rotational_damping"
+    );
+    assert_eq!(refused(|_, b| b.delay_s = 1e3), "delay_s");
+    assert_eq!(refused(|_, b| b.jitter_s = -1.0), "jitter_s");
+    assert_eq!(
+        refused(|_, b| b.velocity_window_s = 0.0),
+        "velocity_window_s"
+    );
+    assert_eq!(refused(|s, _| s.limits.damping = Some(-1.0)), "damping");
+    assert_eq!(
+        refused(|s, _| s.limits.coulomb_friction = Some(f64::NAN)),
+        "coulomb_friction"
+    );
+}

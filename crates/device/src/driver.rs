@@ -18,6 +18,7 @@ use crate::haptic_device::HapticDevice;
 
 pub mod link;
 pub mod simulated;
+pub mod vrpn;
 
 pub use link::{Identity, Link, Threaded};
 
@@ -133,6 +134,7 @@ pub enum Unavailable {
 
 /// All families. Adding one is a file and a line here.
 pub static FAMILIES: &[&dyn Family] = &[&simulated::Simulations];
+pub static FAMILIES: &[&dyn Family] = &[&vrpn::Vrpn];
 
 /// Every device that is attached and every way that leads to none, with the reason.
 #[must_use]

@@ -16,6 +16,7 @@ use thiserror::Error;
 
 use crate::haptic_device::HapticDevice;
 
+pub mod haply;
 pub mod link;
 pub mod simulated;
 pub mod vrpn;
@@ -135,6 +136,7 @@ pub enum Unavailable {
 /// All families. Adding one is a file and a line here.
 pub static FAMILIES: &[&dyn Family] = &[&simulated::Simulations];
 pub static FAMILIES: &[&dyn Family] = &[&vrpn::Vrpn];
+pub static FAMILIES: &[&dyn Family] = &[&haply::Haply];
 
 /// Every device that is attached and every way that leads to none, with the reason.
 #[must_use]

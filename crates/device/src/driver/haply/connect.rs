@@ -262,7 +262,7 @@ fn filter_notes(before: &Config, after: Option<&Inverse>) -> Vec<String> {
 fn outcome(is_taken: Option<bool>) -> &'static str {
     match is_taken {
         Some(true) => "",
-        Some(false) => "; THE SERVICE DID NOT TAKE IT: forces will differ from those computed",
+        Some(false) => "; the service did not take it: forces will differ from those computed",
         None => "; the service does not confirm it",
     }
 }

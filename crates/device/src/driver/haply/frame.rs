@@ -184,7 +184,7 @@ impl Frame {
     }
 }
 
-/// The first frame of a session: its name, once, and the axes of section "frame" in the family's document.
+/// The first frame of a session: its name, once, and its axes: x right, y forward, z up.
 pub(super) fn session_frame() -> String {
     let configure = json!({"profile": {"name": PROFILE}, "basis": {"permutation": "XYZ"}});
     json!({"session": {"configure": configure}}).to_string()

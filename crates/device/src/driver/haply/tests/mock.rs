@@ -12,6 +12,17 @@ use tungstenite::{Error, Message, WebSocket};
 
 use super::recording;
 
+/// What the service does with settings.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Settings {
+    /// Takes them, and tells those in force.
+    Taken,
+    /// Keeps its own, and tells those.
+    Refused,
+    /// Says nothing of them.
+    PassedOver,
+}
+
 /// What the test tells the service.
 #[derive(Clone)]
 pub(super) struct Manner {
@@ -24,8 +35,8 @@ pub(super) struct Manner {
     pub(super) takes: &'static str,
     /// The share of a force that it renders while its gate is closed.
     pub(super) gate: f64,
-    /// Does it take settings, and tell those in force?
-    pub(super) takes_settings: bool,
+    /// What it does with settings.
+    pub(super) settings: Settings,
     /// It hears and does not answer.
     pub(super) is_mute: bool,
     /// It has been killed.
@@ -48,7 +59,7 @@ impl Default for Manner {
             script: Vec::new(),
             takes: "vector",
             gate: 0.3,
-            takes_settings: true,
+            settings: Settings::Taken,
             is_mute: false,
             is_down: false,
             pause: Duration::ZERO,
@@ -255,7 +266,7 @@ fn answer(web: &mut WebSocket<TcpStream>, text: &str, shared: &Shared) -> tungst
     let (number, mut state) = {
         let mut seen = locked(&shared.seen);
         let settings = &frame["inverse3"][0]["configure"];
-        if manner.takes_settings && settings["force_gate"]["gain"] == 1.0 {
+        if manner.settings == Settings::Taken && settings["force_gate"]["gain"] == 1.0 {
             seen.gate_is_open = true;
         }
         if let Some(force) = force_of(&frame, manner.takes) {
@@ -266,8 +277,13 @@ fn answer(web: &mut WebSocket<TcpStream>, text: &str, shared: &Shared) -> tungst
         let f = seen.rendered;
         state["inverse3"][0]["state"]["current_cursor_force"] =
             json!({"x": f.x, "y": f.y, "z": f.z});
-        if manner.takes_settings && settings.is_object() {
-            state["inverse3"][0]["config"] = json!({"filters": settings});
+        if settings.is_object() {
+            let old = &manner.inventory.as_ref().unwrap()["inverse3"][0]["config"]["filters"];
+            match manner.settings {
+                Settings::Taken => state["inverse3"][0]["config"] = json!({"filters": settings}),
+                Settings::Refused => state["inverse3"][0]["config"] = json!({"filters": old}),
+                Settings::PassedOver => {}
+            }
         }
         seen.frames.push(frame);
         if manner.is_numbered {

@@ -20,6 +20,12 @@ pub mod haply;
 pub mod link;
 pub mod simulated;
 pub mod vrpn;
+pub mod dhd;
+pub mod hd;
+mod library;
+pub mod link;
+pub mod simulated;
+pub mod virtuose;
 
 pub use link::{Identity, Link, Threaded};
 
@@ -137,6 +143,7 @@ pub enum Unavailable {
 pub static FAMILIES: &[&dyn Family] = &[&simulated::Simulations];
 pub static FAMILIES: &[&dyn Family] = &[&vrpn::Vrpn];
 pub static FAMILIES: &[&dyn Family] = &[&haply::Haply];
+pub static FAMILIES: &[&dyn Family] = &[&dhd::INSTALLED, &hd::INSTALLED, &virtuose::INSTALLED];
 
 /// Every device that is attached and every way that leads to none, with the reason.
 #[must_use]

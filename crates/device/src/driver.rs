@@ -16,16 +16,18 @@ use thiserror::Error;
 
 use crate::haptic_device::HapticDevice;
 
-pub mod haply;
-pub mod link;
-pub mod simulated;
-pub mod vrpn;
 pub mod dhd;
+mod gamepad;
+pub mod haply;
 pub mod hd;
 mod library;
 pub mod link;
+mod rate;
 pub mod simulated;
+mod spacemouse;
+mod spnav;
 pub mod virtuose;
+pub mod vrpn;
 
 pub use link::{Identity, Link, Threaded};
 
@@ -140,10 +142,17 @@ pub enum Unavailable {
 }
 
 /// All families. Adding one is a file and a line here.
-pub static FAMILIES: &[&dyn Family] = &[&simulated::Simulations];
-pub static FAMILIES: &[&dyn Family] = &[&vrpn::Vrpn];
-pub static FAMILIES: &[&dyn Family] = &[&haply::Haply];
-pub static FAMILIES: &[&dyn Family] = &[&dhd::INSTALLED, &hd::INSTALLED, &virtuose::INSTALLED];
+pub static FAMILIES: &[&dyn Family] = &[
+    &simulated::Simulations,
+    &virtuose::INSTALLED,
+    &dhd::INSTALLED,
+    &hd::INSTALLED,
+    &haply::Haply,
+    &vrpn::Vrpn,
+    &spacemouse::SpaceMouse,
+    &spnav::Spnav,
+    &gamepad::Gamepad,
+];
 
 /// Every device that is attached and every way that leads to none, with the reason.
 #[must_use]

@@ -9,6 +9,7 @@ mod effects;
 mod live;
 mod prepare;
 mod run;
+mod serve;
 mod verify;
 
 use std::ffi::OsString;
@@ -50,6 +51,8 @@ enum Command {
     Scene(SceneArgs),
     /// List haptic devices: what is attached, what could be, and why not.
     Devices(devices::DevicesArgs),
+    /// Offer a simulated device over VRPN, held by a scene's hand.
+    Serve(serve::ServeArgs),
     /// Show what works on this machine and the mend for what does not.
     Doctor(doctor::DoctorArgs),
 }
@@ -153,6 +156,7 @@ fn command(
         Command::Verify(args) => verify::run(args, out, &ui),
         Command::Scene(args) => show_scene_keys(args, out),
         Command::Devices(args) => devices::run(args, out),
+        Command::Serve(args) => serve::run(args, out, &ui),
         Command::Doctor(args) => doctor::run(args, out),
     };
     match result {
@@ -173,6 +177,19 @@ fn show_scene_keys(args: &SceneArgs, out: &mut dyn Write) -> Result<u8, Error> {
     };
     print(out, &text)?;
     Ok(0)
+}
+
+/// Time between two forces at a rate, s.
+///
+/// # Errors
+/// A rate that no haptic device takes.
+fn period_of(rate: f64) -> Result<f64, Error> {
+    if (100.0..=10_000.0).contains(&rate) {
+        return Ok(rate.recip());
+    }
+    Err(Error::Input(format!(
+        "--rate {rate} is not between 100 and 10000 (forces per second; haptic devices take 1000)"
+    )))
 }
 
 /// Writes a result to the output stream.

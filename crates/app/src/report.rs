@@ -17,6 +17,7 @@ pub mod strain;
 pub mod summary;
 pub mod vtu;
 pub mod work_precision;
+pub mod z_width;
 
 mod digits;
 mod font;

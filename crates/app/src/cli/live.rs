@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use device::{Mapping, MappingSettings, ServoSettings};
 
-use super::{CacheArgs, print};
+use super::{CacheArgs, period_of, print};
 use crate::engine::Engine;
 use crate::prepare::{PreparedCompliance, PreparedPart, prepare};
 use crate::progress::Ui;
@@ -153,13 +153,7 @@ pub(super) fn run(args: &LiveArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u
 
 /// Time between two forces, s.
 fn period(args: &LiveArgs, scene: &Scene) -> Result<f64, Error> {
-    match args.rate {
-        None => Ok(scene.device.servo_period),
-        Some(rate) if (100.0..=10_000.0).contains(&rate) => Ok(rate.recip()),
-        Some(rate) => Err(Error::Input(format!(
-            "--rate {rate} is not between 100 and 10000 (forces per second; haptic devices take 1000)"
-        ))),
-    }
+    args.rate.map_or(Ok(scene.device.servo_period), period_of)
 }
 
 /// The session's settings.
@@ -194,7 +188,7 @@ fn live_spec(
         mapping,
         clutch: args.clutch.map_or(0, |button| 1 << (button - 1)),
         lever: part_extent(&prepared.loaded.mesh),
-        servo: ServoSettings::for_limits(limits),
+        servo: ServoSettings::live(limits)?,
         session,
     })
 }
@@ -325,8 +319,9 @@ fn status(snapshot: &Snapshot, elapsed: Duration) -> String {
         );
     };
     format!(
-        "{:7.1} s  travel {:8.3} mm  force {:7.2} N  {:3} contacts  peak {:.2} N  snapped {} in, {} out",
+        "{:7.1} s  {}  travel {:8.3} mm  force {:7.2} N  {:3} contacts  peak {:.2} N  snapped {} in, {} out",
         elapsed.as_secs_f64(),
+        sample.servo.arming,
         1e3 * sample.gone.travel,
         sample.resistance,
         sample.report.contacts,

@@ -3,10 +3,9 @@
 use std::str::FromStr;
 use std::sync::mpsc::{Receiver, channel};
 
+use device::driver::simulated::Model;
 use device::driver::{self, Unavailable};
-use device::{
-    HapticDevice, Insertion, Limits, Script, Simulated, SimulatedHand, SimulatedSettings,
-};
+use device::{HapticDevice, Insertion, Limits, Script, Simulated, SimulatedHand};
 use glam::{DMat3, DQuat, DVec3};
 
 use crate::Error;
@@ -75,8 +74,10 @@ fn cannot(name: &str, why: &Unavailable) -> Error {
 /// A simulated device, held by the scene's hand.
 ///
 /// # Errors
-/// A way that leaves the device's workspace.
-pub(super) fn simulated(_name: &str, session: &SessionSpec) -> Result<Hand, Error> {
+/// A model that does not exist; a way that leaves the device's workspace.
+pub(super) fn simulated(name: &str, session: &SessionSpec) -> Result<Hand, Error> {
+    let (_, place) = name.split_once(':').unwrap_or((name, ""));
+    let model = Model::named(place).map_err(|why| cannot(name, &why))?;
     let script = Script::new(&Insertion {
         start: session.held.start(),
         direction: session.direction,
@@ -87,7 +88,7 @@ pub(super) fn simulated(_name: &str, session: &SessionSpec) -> Result<Hand, Erro
     })?;
     let ends_after_s = script.periods(session.period_s) as f64 * session.period_s;
     let hand = SimulatedHand::new(session.hand, script, session.period_s)?;
-    let device = Simulated::new(SimulatedSettings::default(), hand)?;
+    let device = Simulated::of_model(model, hand)?;
     // Nothing happens to a simulated device.
     let (_, messages) = channel();
     Ok(Hand {

@@ -89,7 +89,7 @@ impl Told<'_> {
             |t: &device::TimeSummary| json!({"p50": t.p50_s, "p99": t.p99_s, "max": t.max_s});
         let events: serde_json::Map<String, Value> = guard(self.report)
             .into_iter()
-            .map(|(what, n)| (what.replace(' ', "_"), json!(n)))
+            .map(|(what, n)| (what.replace(": ", "_").replace(' ', "_"), json!(n)))
             .collect();
         json_text(&json!({
             "title": self.scene.title,
@@ -140,5 +140,15 @@ fn guard(report: &LiveReport) -> Vec<(&'static str, u64)> {
         ("wrenches shortened", events.wrenches_clamped),
         ("wrenches slowed", events.wrenches_rate_limited),
         ("stalls", events.stalls),
+        ("damped for passivity", events.passivity_damped),
+        ("shortened for passivity", events.energy_limited),
+        ("shortened for heat", events.heat_limited),
+        ("weakened for age", events.answers_stale),
+        ("stiffness shortened", events.stiffness_limited),
+        ("cut: device not ready", events.trips_not_ready),
+        ("cut: no hand", events.trips_hand_absent),
+        ("cut: samples lost", events.trips_samples_lost),
+        ("cut: handle too fast", events.trips_too_fast),
+        ("cut: loop stood still", events.trips_stalled),
     ]
 }

@@ -28,6 +28,7 @@ mod watch;
 
 use std::time::Instant;
 
+use device::driver::simulated::Model;
 use device::{
     AsFastAsPossible, Clock, Command, HandSettings, HandleState, HapticDevice, Insertion, Mapping,
     RealTime, Script, Servo, ServoSettings, Simulated, SimulatedHand, SimulatedSettings, Wrench,
@@ -74,6 +75,8 @@ pub struct SessionSpec {
     pub retract: bool,
     /// The hand.
     pub hand: HandSettings,
+    /// The simulated device that it holds; `None`: the limits of a Virtuose 6D as the paper gives them, without a body.
+    pub model: Option<&'static Model>,
     /// s.
     pub period_s: f64,
     /// Whether to wait for the real clock; with one rate the results are the same.
@@ -106,7 +109,10 @@ pub fn run(
     })?;
     let n_periods = script.periods(spec.period_s);
     let hand = SimulatedHand::new(spec.hand, script, spec.period_s)?;
-    let mut device = Simulated::new(SimulatedSettings::default(), hand)?;
+    let mut device = match spec.model {
+        None => Simulated::new(SimulatedSettings::default(), hand),
+        Some(model) => Simulated::of_model(model, hand),
+    }?;
     shape.follow(engine, spec.real_time);
     let rates = choose(spec, engine);
     let every = rates.every;

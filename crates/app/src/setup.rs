@@ -10,6 +10,7 @@ use contact::tool::{
     BoxShape, Capsule, Cylinder, DistanceField, Features, HalfSpace, Mesh as ToolMesh, MeshRepair,
     Sphere, Tool,
 };
+use device::driver::simulated::Model;
 use device::{HandSettings, VirtualCoupling};
 use fem::{Material, Quadrature};
 
@@ -419,6 +420,7 @@ pub fn session(scene: &Scene, held: Held) -> Option<SessionSpec> {
             grip_rotational_stiffness: hand.rotational_stiffness,
             grip_rotational_damping: hand.rotational_damping,
         },
+        model: model(scene),
         period_s: scene.device.servo_period,
         real_time: scene.device.real_time,
         rates: rates(scene),
@@ -438,6 +440,7 @@ pub fn live_session(scene: &Scene, held: Held, period_s: f64) -> SessionSpec {
         hold_s: 0.5,
         retract: scene.drive.retract,
         hand: HandSettings::default(),
+        model: model(scene),
         period_s,
         real_time: true,
         rates: rates(scene),
@@ -446,6 +449,14 @@ pub fn live_session(scene: &Scene, held: Held, period_s: f64) -> SessionSpec {
         period_s,
         real_time: true,
         ..described
+    }
+}
+
+/// The simulated device; `None` for the paper's figures alone.
+fn model(scene: &Scene) -> Option<&'static Model> {
+    match scene.device.model {
+        scene::DeviceModel::Virtuose6d => None,
+        other => Model::named(other.key()).ok(),
     }
 }
 

@@ -32,7 +32,8 @@ use told::Told;
 pub(super) struct LiveArgs {
     /// Scene file.
     scene: PathBuf,
-    /// Device, as `snapin devices` names it; `simulated` or `simulated:MODEL` is held by the scene's hand.
+    /// Device, as `snapin devices` names it; `simulated` (the scene's device.model) or `simulated:MODEL` is held by the
+    /// scene's hand.
     #[arg(long, value_name = "NAME", default_value = "simulated")]
     device: String,
     /// Forces sent to the device per second, 100 to 10000 (default: the scene's device.servo_period).
@@ -96,7 +97,7 @@ pub(super) fn run(args: &LiveArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u
     let session = setup::live_session(&scene, held, period(args, &scene)?);
     let mut opened = match external {
         Some(opened) => opened,
-        None => open::simulated(&args.device, &session)?,
+        None => open::simulated(&args.device, scene.device.model, &session)?,
     };
     opened.notes.iter().for_each(|note| ui.note(note));
     let limits = opened.limits(args.max_force)?;

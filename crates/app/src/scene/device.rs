@@ -24,16 +24,41 @@ pub struct Device {
 /// Known devices.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum DeviceModel {
-    /// simulated, with the force and torque limits of a Virtuose 6D.
+    /// the force and torque limits of a Virtuose 6D as its paper gives them, and nothing else of it.
     #[default]
     #[serde(rename = "virtuose-6d")]
     Virtuose6d,
+    /// a Touch: mass, friction, encoder, delay and limits.
+    #[serde(rename = "touch")]
+    Touch,
+    /// a Falcon, likewise.
+    #[serde(rename = "falcon")]
+    Falcon,
+    /// an omega.3, likewise.
+    #[serde(rename = "omega")]
+    Omega,
+    /// an Inverse3, likewise.
+    #[serde(rename = "inverse3")]
+    Inverse3,
+}
+
+impl DeviceModel {
+    /// What stands after `simulated:` in its name.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Virtuose6d => "virtuose-6d",
+            Self::Touch => "touch",
+            Self::Falcon => "falcon",
+            Self::Omega => "omega",
+            Self::Inverse3 => "inverse3",
+        }
+    }
 }
 
 #[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct DeviceKeys {
-    /// Which device.
+    /// Which device is simulated (`docs/devices.md` has their figures).
     model: DeviceModel,
     /// Time between two forces sent to the device, 1e-5 s to 0.1 s.
     #[schemars(extend("default" = SERVO_PERIOD))]

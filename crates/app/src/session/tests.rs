@@ -48,6 +48,7 @@ pub(super) fn spec() -> SessionSpec {
         hold_s: 1.0,
         retract: false,
         hand: HandSettings::default(),
+        model: None,
         period_s: 1e-3,
         real_time: false,
         rates: Rates::Every(1),

@@ -365,7 +365,8 @@ impl HapticDevice for Simulated {
         let torque = limit_length(wrench_on_handle.torque, limits.peak_torque);
         // To the nearest step, but never beyond the limit.
         let mut force = round_to(allowed_force, limits.force_resolution);
-        if force.length() > allowed {
+        // Without a resolution there is no step to go back by; a limited length may be an ulp beyond its limit.
+        if limits.force_resolution > 0.0 && force.length() > allowed {
             force = (allowed_force / limits.force_resolution).trunc() * limits.force_resolution;
         }
         self.events.peak_limited += u64::from(peak_force != wrench_on_handle.force);

@@ -9,7 +9,7 @@ use device::{HapticDevice, Insertion, Limits, Script, Simulated, SimulatedHand};
 use glam::{DMat3, DQuat, DVec3};
 
 use crate::Error;
-use crate::scene::Scene;
+use crate::scene::{DeviceModel, Scene};
 use crate::session::SessionSpec;
 
 /// What stands before the colon of a simulated device's name.
@@ -75,8 +75,14 @@ fn cannot(name: &str, why: &Unavailable) -> Error {
 ///
 /// # Errors
 /// A model that does not exist; a way that leaves the device's workspace.
-pub(super) fn simulated(name: &str, session: &SessionSpec) -> Result<Hand, Error> {
-    let (_, place) = name.split_once(':').unwrap_or((name, ""));
+pub(super) fn simulated(
+    name: &str,
+    of_scene: DeviceModel,
+    session: &SessionSpec,
+) -> Result<Hand, Error> {
+    let place = name
+        .split_once(':')
+        .map_or(of_scene.key(), |(_, place)| place);
     let model = Model::named(place).map_err(|why| cannot(name, &why))?;
     let script = Script::new(&Insertion {
         start: session.held.start(),

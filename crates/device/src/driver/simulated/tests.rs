@@ -296,3 +296,24 @@ fn body_out_of_range_is_refused_by_name() {
         "coulomb_friction"
     );
 }
+
+/// A limited force whose length is an ulp beyond the limit was divided by a resolution of 0: no number went to the hand.
+#[test]
+fn force_beyond_the_limit_of_a_device_without_resolution_stays_a_number() {
+    for model in MODELS {
+        let hand = SimulatedHand::resting(HandSettings::default(), DPose3::IDENTITY, 1e-3).unwrap();
+        let mut device = Simulated::of_model(model, hand).unwrap();
+        for k in 0..2000 {
+            let angle = f64::from(k);
+            device.read(1e-3 * angle).unwrap();
+            let direction = DVec3::new(angle.sin(), (0.7 * angle).cos(), (1.3 * angle).sin());
+            let beyond = 1.5 * model.limits.peak_force * direction;
+            device
+                .write(&Wrench::new(beyond, DVec3::ZERO).into())
+                .unwrap();
+            let rendered = device.rendered();
+            assert!(rendered.is_finite(), "{}: {beyond}", model.key);
+            assert!(rendered.force.length() <= model.limits.peak_force * (1.0 + 1e-15));
+        }
+    }
+}

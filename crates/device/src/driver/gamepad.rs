@@ -6,11 +6,18 @@
 //! ```
 //! Rumble has no direction: it tells how large the force is, not where it points.
 
-mod pad;
-mod rumble;
+#![cfg_attr(
+    not(target_os = "linux"),
+    allow(
+        dead_code,
+        reason = "without device files nothing asks for it, but it is compiled and tested"
+    )
+)]
 
 #[cfg(target_os = "linux")]
 mod node;
+mod pad;
+mod rumble;
 
 use std::io::ErrorKind;
 use std::time::Duration;

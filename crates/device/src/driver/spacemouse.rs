@@ -13,6 +13,7 @@ use crate::error::DeviceError;
 mod hid;
 mod report;
 
+#[cfg(unix)]
 pub(super) use report::{DEAD, FULL};
 
 use hid::{Found, Hid};

@@ -34,14 +34,14 @@ impl Pretended {
             .read(true)
             .write(true)
             .open("/dev/uhid")?;
-        let mut event = vec![0; 4 + 280 + 4096];
+        let mut event = vec![0; 4 + 276 + 4096];
         event[0] = 11; // create
         event[4..4 + name.len()].copy_from_slice(name.as_bytes());
         event[260] = DESCRIPTOR.len() as u8;
         event[262] = 3; // USB
         event[264..266].copy_from_slice(&0x256f_u16.to_le_bytes());
         event[268..270].copy_from_slice(&0xc635_u16.to_le_bytes());
-        event[284..284 + DESCRIPTOR.len()].copy_from_slice(&DESCRIPTOR);
+        event[280..280 + DESCRIPTOR.len()].copy_from_slice(&DESCRIPTOR);
         line.write_all(&event)?;
         Ok(Self(line))
     }
@@ -56,7 +56,7 @@ impl Pretended {
 
     /// The next report that it was sent.
     fn hear(line: &mut File) -> Vec<u8> {
-        let mut event = vec![0; 4 + 280 + 4096];
+        let mut event = vec![0; 4 + 276 + 4096];
         loop {
             let length = line.read(&mut event).unwrap();
             // Output: 4096 bytes, of which so many count.

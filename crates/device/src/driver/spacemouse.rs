@@ -43,19 +43,24 @@ impl Family for SpaceMouse {
     }
 
     fn open(&self, place: &str) -> Result<Opened, Unavailable> {
-        let (path, settings) = rate::split_place(KEY, place)?;
-        if path.is_empty() && spnav::is_there() {
-            return spnav::open_at(&spnav::usual_socket(), settings);
-        }
-        let path = path.to_owned();
-        let handle = Arc::new(Mutex::new(RateHandle::new(settings)));
-        Threaded::open(move || {
-            let found = pick(hid::find()?, &path)?;
-            let reports = Hid::open(&found)?;
-            let notes = vec![settings.note()];
-            Ok(connect(found.title(), notes, reports, &handle))
-        })
+        open_unless_daemon(place, &spnav::usual_socket())
     }
+}
+
+/// Opens the device at a place over HID; the first there is rather through the daemon, if that listens at a socket.
+fn open_unless_daemon(place: &str, socket: &str) -> Result<Opened, Unavailable> {
+    let (path, settings) = rate::split_place(KEY, place)?;
+    if path.is_empty() && spnav::is_at(socket) {
+        return spnav::open_at(socket, settings);
+    }
+    let path = path.to_owned();
+    let handle = Arc::new(Mutex::new(RateHandle::new(settings)));
+    Threaded::open(move || {
+        let found = pick(hid::find()?, &path)?;
+        let reports = Hid::open(&found)?;
+        let notes = vec![settings.note()];
+        Ok(connect(found.title(), notes, reports, &handle))
+    })
 }
 
 /// One line for each device, or one that says why there is none.

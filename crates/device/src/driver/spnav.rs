@@ -63,9 +63,9 @@ fn chosen_socket(from_environment: Option<String>) -> String {
         .unwrap_or_else(|| SOCKET.to_owned())
 }
 
-/// Does the daemon listen at its usual place?
-pub(super) fn is_there() -> bool {
-    probe(&usual_socket()).is_ok()
+/// Does the daemon listen at a socket?
+pub(super) fn is_at(socket: &str) -> bool {
+    probe(socket).is_ok()
 }
 
 #[cfg(unix)]

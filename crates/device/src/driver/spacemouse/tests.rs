@@ -445,6 +445,24 @@ fn wrong_option_is_refused_before_anything_is_looked_for() {
     assert!(matches!(refused, Unavailable::UnknownName { .. }));
 }
 
+/// The daemon is preferred where it listens, unless a device file is named; one that has ended is passed over.
+#[cfg(unix)]
+#[test]
+fn daemon_is_preferred_where_it_listens() {
+    let folder = tempfile::tempdir().unwrap();
+    let socket = folder.path().join("s");
+    let path = socket.to_str().unwrap();
+    let listener = std::os::unix::net::UnixListener::bind(&socket).unwrap();
+    let opened = open_unless_daemon("?speed=0.3", path).unwrap();
+    assert!(opened.device.name().contains("spacenavd"));
+    assert!(opened.notes.iter().any(|n| n.contains("300 mm/s")));
+    let named = open_unless_daemon("/dev/none", path).unwrap_err();
+    assert!(!named.to_string().contains("spacenavd"), "{named}");
+    drop(listener);
+    let over_hid = open_unless_daemon("", path).map(|o| o.device.name().to_owned());
+    assert!(!over_hid.is_ok_and(|name| name.contains("spacenavd")));
+}
+
 #[test]
 fn family_lists_at_least_one_line_that_opens_or_says_why() {
     let lines = SpaceMouse.list();

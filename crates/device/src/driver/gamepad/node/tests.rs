@@ -1,6 +1,7 @@
 //! Pads in folders of the test's own, and one that the kernel itself pretends, where it lets us.
 
 use std::fs;
+use std::io::Write;
 use std::time::{Duration, Instant};
 
 use evdev::uinput::VirtualDevice;
@@ -165,23 +166,43 @@ fn wait_until(mut holds: impl FnMut() -> bool) {
     }
 }
 
-/// The whole way through the kernel: found, opened, moved, rumbled, closed, unplugged.
-#[test]
-fn pad_that_the_kernel_pretends_moves_the_handle_and_rumbles() {
+/// The pretended pad with its device file, where the kernel lets us.
+fn pretended_with_file() -> Option<(VirtualDevice, PathBuf)> {
     let mut pad = match pretended() {
         Ok(pad) => pad,
         Err(why) => {
-            eprintln!("not tried with a pad of the kernel's own, /dev/uinput: {why}");
-            return;
+            // Past the test runner, which keeps what passing tests print.
+            let told = format!("not tried with a pad of the kernel's own, /dev/uinput: {why}\n");
+            io::stderr().write_all(told.as_bytes()).unwrap();
+            return None;
         }
     };
-    let path = pad
-        .enumerate_dev_nodes_blocking()
-        .unwrap()
-        .next()
-        .unwrap()
-        .unwrap();
+    let mut files = pad.enumerate_dev_nodes_blocking().unwrap();
+    let path = files.next().unwrap().unwrap();
     wait_until(|| path.exists());
+    Some((pad, path))
+}
+
+#[test]
+fn pad_that_the_kernel_takes_away_is_told() {
+    let Some((pad, path)) = pretended_with_file() else {
+        return;
+    };
+    let mut opened = open(path.to_str().unwrap()).unwrap();
+    wait_until(|| opened.device.read(0.0).is_ok());
+    drop(pad);
+    let lost = "is lost (the gamepad no longer answers";
+    let wait = Duration::from_secs(10);
+    while !opened.messages.recv_timeout(wait).unwrap().contains(lost) {}
+    wait_until(|| opened.device.read(0.0).is_err());
+}
+
+/// The whole way through the kernel: found, opened, moved, rumbled, closed.
+#[test]
+fn pad_that_the_kernel_pretends_moves_the_handle_and_rumbles() {
+    let Some((mut pad, path)) = pretended_with_file() else {
+        return;
+    };
     let listed = list();
     let name = format!("gamepad:{}", path.display());
     assert!(

@@ -85,7 +85,9 @@ fn puck_that_the_kernel_pretends_moves_the_handle() {
     let mut line = match Pretended::new("Pretended puck") {
         Ok(line) => line,
         Err(why) => {
-            eprintln!("not tried with a puck of the kernel's own, /dev/uhid: {why}");
+            // Past the test runner, which keeps what passing tests print.
+            let told = format!("not tried with a puck of the kernel's own, /dev/uhid: {why}\n");
+            io::stderr().write_all(told.as_bytes()).unwrap();
             return;
         }
     };

@@ -13,7 +13,7 @@
 //! stable over a slow link (Mark et al. 1996).
 //!
 //! Stock servers have no watchdog: a client that hangs leaves its force behind. Here the field fades with the command
-//! (see [`Threaded`](super::Threaded)), is switched off on the reliable connection, and before leaving the server's
+//! (see [`Threaded`]), is switched off on the reliable connection, and before leaving the server's
 //! report is waited for. The [`Server`] has a watchdog of its own.
 
 use std::time::Duration;
@@ -100,3 +100,6 @@ fn none(error: Unavailable) -> Listing {
         status: Err(error),
     }
 }
+
+#[cfg(test)]
+mod tests;

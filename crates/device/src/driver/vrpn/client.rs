@@ -1,6 +1,5 @@
 //! The client's end: opening, exchanging poses and forces, leaving.
 
-use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 use glam::DVec3;
@@ -9,16 +8,18 @@ use super::dial::{call_back, dial};
 use super::endpoint::{Broken, Endpoint, Service};
 use super::field::Form;
 use super::message::{ForceField, Kind, Message};
-use super::peer::Event;
 use super::place::{Place, Way};
-use super::wire::ProtocolError;
 use crate::driver::Unavailable;
 use crate::driver::link::{Connected, Identity, Link};
 use crate::error::DeviceError;
 use crate::haptic_device::{Command, HandleState, Limits};
 use heard::Heard;
 
+pub(super) use opening::offers;
+use opening::{explain, why_silent};
+
 mod heard;
+mod opening;
 
 /// What this side sends; the other side ignores what was not described.
 const SENT: &[Kind] = &[
@@ -34,11 +35,11 @@ const RATE: f64 = 1000.0;
 /// Rate of poses below which the user is told, Hz.
 const RATE_LOW: f64 = 250.0;
 
+/// Time over which the rate of poses is judged, s.
+const RATE_JUDGED_S: f64 = 2.0;
+
 /// Longest wait for greeting, descriptions and the first pose, s.
 const GREETING_S: f64 = 2.0;
-
-/// Longest wait for the descriptions when devices are listed, s.
-const LIST_S: f64 = 0.4;
 
 /// Longest wait for the workspace after the first pose, s: it comes with the next turn of the server's loop.
 const WORKSPACE_S: f64 = 0.2;
@@ -91,62 +92,6 @@ pub(super) fn connect(place: &Place) -> Result<Connected, Unavailable> {
     Ok((link.identity(place), Box::new(link)))
 }
 
-/// Version of the server at the other end, and the names of its devices.
-pub(super) fn offers(place: &Place, tcp: TcpStream) -> Result<(String, Vec<String>), Unavailable> {
-    let begun = Instant::now();
-    let mut heard = Heard::new(place);
-    let mut ask = || -> Result<Option<String>, Broken> {
-        let mut endpoint = Endpoint::new(tcp, false)?;
-        let mut has_all = false;
-        while !has_all && begun.elapsed().as_secs_f64() < LIST_S {
-            endpoint.flush()?;
-            endpoint.receive(Duration::from_millis(20), |event| {
-                // All senders are described before the first type.
-                has_all |= matches!(event, Event::Kind { .. });
-                heard.note(event, Instant::now());
-            })?;
-        }
-        let version = endpoint.version().map(str::to_owned);
-        endpoint.leave(Duration::from_secs_f64(LEAVE_CLOSE_S));
-        Ok(version)
-    };
-    match ask() {
-        Ok(Some(version)) => Ok((version, heard.offered().to_vec())),
-        Ok(None) => Err(says_nothing(place)),
-        Err(broken) => Err(explain(place, &broken, false)),
-    }
-}
-
-/// What a broken link means to who wanted to open it.
-pub(super) fn explain(place: &Place, broken: &Broken, has_greeted: bool) -> Unavailable {
-    let server = place.server();
-    match broken {
-        Broken::Protocol(ProtocolError::Cookie { found }) => Unavailable::WrongVersion {
-            what: format!("the VRPN server at {server}"),
-            found: format!("\"{found}\""),
-            mend: "07.xx is understood, and its greeting is \"vrpn: ver. 07.xx  0\"".to_owned(),
-        },
-        broken if has_greeted => Unavailable::Failed {
-            reason: format!("the VRPN server at {server} is lost: {broken}"),
-        },
-        broken => Unavailable::NotThere {
-            reason: format!(
-                "what answers at {server} does not greet as a VRPN server does ({broken}); \
-                 check host and port"
-            ),
-        },
-    }
-}
-
-fn says_nothing(place: &Place) -> Unavailable {
-    Unavailable::NotThere {
-        reason: format!(
-            "what answers at {} says nothing; check that it is a VRPN server",
-            place.server()
-        ),
-    }
-}
-
 /// A link to one device.
 struct VrpnLink {
     endpoint: Endpoint,
@@ -161,7 +106,6 @@ struct VrpnLink {
     given: Option<(DVec3, Instant)>,
     given_before: Option<DVec3>,
     pinged_at: Instant,
-    opened_at: Instant,
     is_rate_judged: bool,
 }
 
@@ -178,7 +122,6 @@ impl VrpnLink {
             given: None,
             given_before: None,
             pinged_at: now,
-            opened_at: now,
             is_rate_judged: false,
         }
     }
@@ -198,7 +141,7 @@ impl VrpnLink {
                 self.ask();
                 is_described = true;
             }
-            if is_described && self.heard.poses() > 0 {
+            if is_described && self.heard.has_pose() {
                 let since: Instant = *posed_at.get_or_insert_with(Instant::now);
                 let is_told = self.heard.workspace_half_extents().is_some();
                 if is_told || since.elapsed().as_secs_f64() > WORKSPACE_S {
@@ -207,7 +150,7 @@ impl VrpnLink {
             }
         }
         self.endpoint.leave(Duration::from_secs_f64(LEAVE_CLOSE_S));
-        Err(self.why_silent(place))
+        Err(why_silent(place, self.endpoint.version(), &self.heard))
     }
 
     /// What is asked of the server at the beginning.
@@ -218,35 +161,6 @@ impl VrpnLink {
             Message::Ping,
         ] {
             self.endpoint.send(Service::Reliable, &message);
-        }
-    }
-
-    fn why_silent(&self, place: &Place) -> Unavailable {
-        let server = place.server();
-        if self.endpoint.version().is_none() {
-            return says_nothing(place);
-        }
-        let offered = match self.heard.offered() {
-            [] => "none".to_owned(),
-            names => names.join(", "),
-        };
-        let Some(name) = self.heard.offered_name() else {
-            let wanted = place.sender.as_deref().unwrap_or("that sends poses");
-            return Unavailable::NotThere {
-                reason: format!(
-                    "the VRPN server at {server} has no device {wanted}; its devices: {offered}"
-                ),
-            };
-        };
-        let hint = match place.way {
-            Way::Tcp => "",
-            Way::Udp => ", and no firewall may stop its datagrams: vrpn:tcp:// does without them",
-        };
-        Unavailable::NotReady {
-            reason: format!(
-                "{name} at {server} sends no poses of sensor {}; it must be switched on and calibrated{hint}",
-                place.sensor
-            ),
         }
     }
 
@@ -263,8 +177,8 @@ impl VrpnLink {
             ));
         } else if !place.is_rated {
             notes.push(format!(
-                "VRPN tells no limits; those of a 3D Systems Touch are assumed ({} N, {} N/m). \
-                 Others are given behind the name: ?force=N&stiffness=N/m",
+                "VRPN tells no limits of a device: {} N and {} N/m are taken for this one (of a 3D Systems Touch \
+                 where not given); others are given behind its name, ?force=N&stiffness=N/m",
                 place.force, place.stiffness
             ));
         }
@@ -356,9 +270,8 @@ impl VrpnLink {
                 "the server is there, but has sent no pose for {OLD_S} s"
             ));
         }
-        if !self.is_rate_judged && since(self.opened_at) > 2.0 * GREETING_S {
+        if let (false, Some(rate)) = (self.is_rate_judged, self.heard.rate(RATE_JUDGED_S)) {
             self.is_rate_judged = true;
-            let rate = self.heard.poses() as f64 / since(self.opened_at);
             if rate < RATE_LOW {
                 self.heard.tell(format!(
                     "the server sends {rate:.0} poses a second where {RATE} were asked for; \
@@ -412,3 +325,6 @@ impl Link for VrpnLink {
         self.endpoint.leave(Duration::from_secs_f64(LEAVE_CLOSE_S));
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -66,6 +66,14 @@ fn not_there(place: &Place, why: &str) -> Unavailable {
 
 /// Asks the server to call back, again and again, and waits for the call.
 pub(super) fn call_back(place: &Place) -> Result<TcpStream, Unavailable> {
+    call_back_within(place, ASK_AGAIN_S, CALL_BACK_S)
+}
+
+fn call_back_within(
+    place: &Place,
+    ask_again_s: f64,
+    wait_s: f64,
+) -> Result<TcpStream, Unavailable> {
     // The request has room for an address of version 4 alone.
     let server = resolve(place)?.into_iter().find(SocketAddr::is_ipv4);
     let server = server.ok_or_else(|| {
@@ -87,8 +95,8 @@ pub(super) fn call_back(place: &Place) -> Result<TcpStream, Unavailable> {
     let begun = Instant::now();
     let mut asked_at: Option<Instant> = None;
     let mut stranger = None;
-    while begun.elapsed().as_secs_f64() < CALL_BACK_S {
-        if asked_at.is_none_or(|at| at.elapsed().as_secs_f64() > ASK_AGAIN_S) {
+    while begun.elapsed().as_secs_f64() < wait_s {
+        if asked_at.is_none_or(|at| at.elapsed().as_secs_f64() > ask_again_s) {
             asked_at = Some(Instant::now());
             asking
                 .send(request.as_bytes())
@@ -106,15 +114,39 @@ pub(super) fn call_back(place: &Place) -> Result<TcpStream, Unavailable> {
             return Err(nobody(place, &e));
         }
     }
-    Err(not_there(place, &nobody_called(own_ip, port, stranger)))
+    Err(not_there(
+        place,
+        &nobody_called(own_ip, port, wait_s, stranger),
+    ))
 }
 
-fn nobody_called(own: IpAddr, port: u16, stranger: Option<IpAddr>) -> String {
+fn nobody_called(own: IpAddr, port: u16, wait_s: f64, stranger: Option<IpAddr>) -> String {
     let stranger = stranger.map_or_else(String::new, |ip| {
         format!(" (only {ip} called, which is not the server's address)")
     });
     format!(
-        "it was asked to call {own} port {port} and has not within {CALL_BACK_S} s{stranger}; \
+        "it was asked to call {own} port {port} and has not within {wait_s} s{stranger}; \
          vrpn:tcp:// needs no call"
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn server_that_never_calls_back_is_asked_again_and_then_not_there() {
+        let silent = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let address = silent.local_addr().unwrap();
+        let place = Place::parse(&format!("udp://Hand0@{address}")).unwrap();
+        let error = call_back_within(&place, 0.01, 0.1).unwrap_err().to_string();
+        assert!(error.contains("asked to call 127.0.0.1 port"), "{error}");
+        assert!(error.contains(&address.to_string()), "{error}");
+        let mut request = [0; 64];
+        for _ in 0..2 {
+            let count = silent.recv(&mut request).unwrap();
+            assert!(request[..count].starts_with(b"127.0.0.1 "));
+            assert_eq!(request[count - 1], 0);
+        }
+    }
 }

@@ -123,11 +123,6 @@ impl Endpoint {
         self.decoder.version()
     }
 
-    /// Address of the other side.
-    pub(super) fn peer_ip(&self) -> IpAddr {
-        self.peer_ip
-    }
-
     /// When anything came last.
     pub(super) fn heard_at(&self) -> Instant {
         self.heard_at
@@ -329,3 +324,6 @@ impl Datagrams {
         let _next_read_tells = (looked, socket.set_nonblocking(true));
     }
 }
+
+#[cfg(test)]
+pub(super) mod tests;

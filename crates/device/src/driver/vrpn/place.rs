@@ -49,7 +49,7 @@ pub(super) struct Place {
     pub(super) force: f64,
     /// Largest stiffness, N/m.
     pub(super) stiffness: f64,
-    /// Were force and stiffness given?
+    /// Were both given?
     pub(super) is_rated: bool,
     pub(super) form: Form,
     pub(super) velocity: VelocityFrom,
@@ -92,6 +92,8 @@ impl Place {
             velocity: VelocityFrom::Poses,
         };
         place.check_sender()?;
+        let is_given = |key| options.split('&').any(|option| option.starts_with(key));
+        place.is_rated = is_given("force=") && is_given("stiffness=");
         for option in options.split('&').filter(|option| !option.is_empty()) {
             place.set(option)?;
         }
@@ -118,7 +120,6 @@ impl Place {
         match (key, value) {
             ("force", _) => {
                 self.force = number(key, value, 0.1, 50.0)?;
-                self.is_rated = true;
             }
             ("stiffness", _) => self.stiffness = number(key, value, 10.0, 1e4)?,
             ("sensor", _) => self.sensor = number(key, value, 0.0, 255.0)? as i32,

@@ -105,7 +105,7 @@ mod tests {
         window.push(at(0), &x(0.0));
         window.push(at(10), &x(f64::NAN));
         let mut bent = x(9.0);
-        bent.rotation = bent.rotation * 3.0;
+        bent.rotation *= 3.0;
         window.push(at(15), &bent);
         window.push(at(20), &x(0.02));
         assert!((window.velocity().0.x - 1.0).abs() < 1e-9);

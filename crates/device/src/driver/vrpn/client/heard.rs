@@ -40,6 +40,7 @@ pub(super) struct Heard {
     /// Has the newest pose not been taken yet?
     is_new: bool,
     poses: u64,
+    first_at: Option<Instant>,
     window: Window,
     servers_motion: Option<Motion>,
     buttons: u32,
@@ -68,6 +69,7 @@ impl Heard {
             newest: None,
             is_new: false,
             poses: 0,
+            first_at: None,
             window: Window::default(),
             servers_motion: None,
             buttons: 0,
@@ -101,9 +103,15 @@ impl Heard {
             .map(|newest| (newest.pose.translation, newest.at))
     }
 
-    /// Number of poses so far.
-    pub(super) fn poses(&self) -> u64 {
-        self.poses
+    /// Has a pose come?
+    pub(super) fn has_pose(&self) -> bool {
+        self.newest.is_some()
+    }
+
+    /// Poses in a second, once there were some for a while (s).
+    pub(super) fn rate(&self, while_s: f64) -> Option<f64> {
+        let elapsed_s = self.newest?.at.duration_since(self.first_at?).as_secs_f64();
+        (elapsed_s > while_s).then(|| (self.poses - 1) as f64 / elapsed_s)
     }
 
     /// Force that the server rendered last (N); none where it reports none.
@@ -209,6 +217,7 @@ impl Heard {
         });
         self.is_new = true;
         self.poses += 1;
+        self.first_at.get_or_insert(now);
     }
 
     fn note_button(&mut self, button: i32, state: i32) {

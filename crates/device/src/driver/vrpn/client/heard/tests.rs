@@ -113,7 +113,7 @@ fn buttons_are_bits_and_numbers_beyond_are_left_out() {
 #[test]
 fn force_error_trips_for_a_while_or_until_all_is_well() {
     let mut heard = heard("Hand0@h");
-    let mut readiness = |heard: &mut Heard, code: Option<i32>, later_s: f64| {
+    let readiness = |heard: &mut Heard, code: Option<i32>, later_s: f64| {
         if let Some(code) = code {
             from_hand(heard, 1, Message::ForceError(code));
         }

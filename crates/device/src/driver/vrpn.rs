@@ -13,8 +13,11 @@
 //! stable over a slow link (Mark et al. 1996).
 //!
 //! Stock servers have no watchdog: a client that hangs leaves its force behind. Here the field fades with the command
-//! (see [`Threaded`]), is switched off on the reliable connection, and before leaving the server's
-//! report is waited for. The [`Server`] has a watchdog of its own.
+//! (see [`Threaded`]), is switched off on the reliable connection, and before leaving the server's report is waited
+//! for. The [`Server`] has a watchdog of its own.
+//!
+//! The velocity is made from the poses: of the stock servers the Falcon's sends metres per microsecond and no turn, and
+//! the Phantom's the difference of two samples. `?velocity=server` takes the server's all the same.
 
 use std::time::Duration;
 

@@ -12,6 +12,10 @@ use crate::wrench::rotation_vector;
 /// period; the velocity lags by half the window.
 const WINDOW_S: f64 = 0.02;
 
+/// Least time between two poses from which a velocity is made, s: poses that came in one piece of the stream and bear
+/// no time have none between them.
+const ELAPSED_MIN_S: f64 = 0.005;
+
 /// Most poses in the window; beyond it the window is shorter.
 const POSES_MAX: usize = 64;
 
@@ -21,46 +25,56 @@ const GAP_MAX_S: f64 = 0.2;
 /// Poses of the last moments.
 ///
 /// Times are those of arrival: another machine's clock need not be trusted, and arrival that is uneven by a
-/// millisecond makes an error of a twentieth of the velocity, none at rest.
+/// millisecond makes an error of a twentieth of the velocity, none at rest. Poses that a stall held up come at once,
+/// so where the sender's clock says that more time has passed between two, it is believed.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Window {
-    poses: VecDeque<(Instant, DPose3)>,
+    poses: VecDeque<Sample>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    at: Instant,
+    /// Time on the sender's clock, s.
+    sent_s: f64,
+    pose: DPose3,
 }
 
 impl Window {
-    /// Adds a pose. One that is no pose is left out.
-    pub(super) fn push(&mut self, at: Instant, pose: &DPose3) {
+    /// Adds a pose that came now and was sent at a time of the sender's clock (s). One that is no pose is left out.
+    pub(super) fn push(&mut self, at: Instant, sent_s: f64, pose: &DPose3) {
         let off_unit = (pose.rotation.length_squared() - 1.0).abs();
         if !pose.translation.is_finite() || off_unit.is_nan() || off_unit > 1e-3 {
             return;
         }
-        if let Some((newest, _)) = self.poses.back()
-            && at.duration_since(*newest).as_secs_f64() > GAP_MAX_S
-        {
+        let age_s = |sample: &Sample| at.duration_since(sample.at).as_secs_f64();
+        if self.poses.back().is_some_and(|s| age_s(s) > GAP_MAX_S) {
             self.poses.clear();
         }
         // The last one beyond the window stays: the difference is taken over at least its length.
-        while let Some((second, _)) = self.poses.get(1)
-            && (at.duration_since(*second).as_secs_f64() >= WINDOW_S
-                || self.poses.len() >= POSES_MAX)
+        while let Some(second) = self.poses.get(1)
+            && (age_s(second) >= WINDOW_S || self.poses.len() >= POSES_MAX)
         {
             self.poses.pop_front();
         }
-        self.poses.push_back((at, *pose));
+        let pose = *pose;
+        self.poses.push_back(Sample { at, sent_s, pose });
     }
 
     /// Velocity (m/s) and angular velocity (rad/s); 0 as long as there are no two poses some time apart.
     pub(super) fn velocity(&self) -> (DVec3, DVec3) {
-        let (Some((from, old)), Some((to, new))) = (self.poses.front(), self.poses.back()) else {
+        let (Some(old), Some(new)) = (self.poses.front(), self.poses.back()) else {
             return (DVec3::ZERO, DVec3::ZERO);
         };
-        let elapsed_s = to.duration_since(*from).as_secs_f64();
-        // Poses that came in one piece of the stream have no time between them.
-        if elapsed_s < 0.25 * WINDOW_S {
+        let arrived_s = new.at.duration_since(old.at).as_secs_f64();
+        let sent_s = new.sent_s - old.sent_s;
+        let is_believed = sent_s > arrived_s && sent_s < GAP_MAX_S;
+        let elapsed_s = if is_believed { sent_s } else { arrived_s };
+        if elapsed_s < ELAPSED_MIN_S {
             return (DVec3::ZERO, DVec3::ZERO);
         }
-        let way = new.translation - old.translation;
-        let turn = rotation_vector(new.rotation * old.rotation.conjugate());
+        let way = new.pose.translation - old.pose.translation;
+        let turn = rotation_vector(new.pose.rotation * old.pose.rotation.conjugate());
         (way / elapsed_s, turn / elapsed_s)
     }
 }
@@ -82,7 +96,7 @@ mod tests {
             for k in 0..200 {
                 let t = f64::from(k) * period_s;
                 let pose = DPose3::from_parts(linear * t, rotation_from_vector(angular * t));
-                window.push(begun + Duration::from_secs_f64(t), &pose);
+                window.push(begun + Duration::from_secs_f64(t), 0.0, &pose);
                 assert!(window.poses.len() <= POSES_MAX);
             }
             let (v, w) = window.velocity();
@@ -98,18 +112,41 @@ mod tests {
         let x = |x| DPose3::from_translation(DVec3::new(x, 0.0, 0.0));
         let mut window = Window::default();
         assert_eq!(window.velocity(), (DVec3::ZERO, DVec3::ZERO));
-        window.push(at(0), &x(0.0));
-        window.push(at(0), &x(0.5));
+        window.push(at(0), 0.0, &x(0.0));
+        window.push(at(0), 0.0, &x(0.5));
         assert_eq!(window.velocity().0, DVec3::ZERO);
         let mut window = Window::default();
-        window.push(at(0), &x(0.0));
-        window.push(at(10), &x(f64::NAN));
+        window.push(at(0), 0.0, &x(0.0));
+        window.push(at(10), 0.0, &x(f64::NAN));
         let mut bent = x(9.0);
         bent.rotation *= 3.0;
-        window.push(at(15), &bent);
-        window.push(at(20), &x(0.02));
+        window.push(at(15), 0.0, &bent);
+        window.push(at(20), 0.0, &x(0.02));
         assert!((window.velocity().0.x - 1.0).abs() < 1e-9);
-        window.push(at(1020), &x(7.0));
+        window.push(at(1020), 0.0, &x(7.0));
         assert_eq!(window.velocity().0, DVec3::ZERO);
+    }
+
+    #[test]
+    fn poses_held_up_by_a_stall_have_the_velocity_of_when_they_were_sent() {
+        let begun = Instant::now();
+        // 1 m/s at 1 kHz; what is sent from 30 to 129 ms comes at 130 ms.
+        let mut window = Window::default();
+        for k in 0..200 {
+            let sent_s = 1e-3 * f64::from(k);
+            let arrived_s = if (30..130).contains(&k) { 0.13 } else { sent_s };
+            let pose = DPose3::from_translation(DVec3::new(sent_s, 0.0, 0.0));
+            window.push(
+                begun + Duration::from_secs_f64(arrived_s),
+                5e8 + sent_s,
+                &pose,
+            );
+            let v = window.velocity().0.x;
+            assert!(v < 1.01, "{k}: {v}");
+            // Of those that come at once only the last is asked for.
+            let is_asked = (6..30).contains(&k) || k >= 129;
+            assert!(!is_asked || v > 0.9, "{k}: {v}");
+        }
+        assert!((window.velocity().0.x - 1.0).abs() < 1e-3);
     }
 }

@@ -209,7 +209,7 @@ impl Heard {
             DVec3::from(sent.at.position),
             DQuat::from_array(sent.at.rotation),
         );
-        self.window.push(now, &pose);
+        self.window.push(now, seconds(time), &pose);
         self.newest = Some(Pose {
             time,
             at: now,

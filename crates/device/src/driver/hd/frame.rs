@@ -97,8 +97,6 @@ pub(super) struct Frames {
 
 impl Frames {
     fn run(&mut self) {
-        let wanted = *self.wanted.read();
-        let (force, torque) = self.rendered(&wanted);
         let device = self.device;
         let newest = &mut self.newest;
         let is_calibration_due = newest.frame.is_multiple_of(CALIBRATION_EVERY);
@@ -116,6 +114,9 @@ impl Frames {
         if is_calibration_due {
             newest.calibration = device.check_calibration();
         }
+        // Only now, so that what is wanted is the newest also where the library took long so far.
+        let wanted = *self.wanted.read();
+        let (force, torque) = rendered(&wanted);
         device.set(number::FORCE, force);
         if newest.has_torque {
             device.set(number::TORQUE, torque);
@@ -137,20 +138,6 @@ impl Frames {
         self.seen.write(self.newest);
     }
 
-    /// The wrench of this frame: nothing that is not finite, and what the link does not renew fades.
-    fn rendered(&self, wanted: &Wanted) -> ([f64; 3], [f64; 3]) {
-        let gain = Watchdog::for_link().gain_at_age(wanted.at.elapsed().as_secs_f64());
-        let (force, torque) = (
-            wanted.force.map(|x| gain * x),
-            wanted.torque.map(|x| gain * x),
-        );
-        let is_finite = force.iter().chain(&torque).all(|x| x.is_finite());
-        if wanted.is_leaving || !is_finite {
-            return ([0.0; 3], [0.0; 3]);
-        }
-        (force, torque)
-    }
-
     fn count_errors(&mut self) {
         for code in self.device.errors() {
             let kind = match code >> 8 {
@@ -167,6 +154,20 @@ impl Frames {
             }
         }
     }
+}
+
+/// The wrench of this frame: nothing that is not finite, and what the link does not renew fades.
+fn rendered(wanted: &Wanted) -> ([f64; 3], [f64; 3]) {
+    let gain = Watchdog::for_link().gain_at_age(wanted.at.elapsed().as_secs_f64());
+    let (force, torque) = (
+        wanted.force.map(|x| gain * x),
+        wanted.torque.map(|x| gain * x),
+    );
+    let is_finite = force.iter().chain(&torque).all(|x| x.is_finite());
+    if wanted.is_leaving || !is_finite {
+        return ([0.0; 3], [0.0; 3]);
+    }
+    (force, torque)
 }
 
 /// What the scheduler calls.

@@ -25,7 +25,10 @@ const UNIT_TOLERANCE: f64 = 1e-2;
 /// Handle speed below which a device that has cut its force may be switched on again, m/s.
 pub(in crate::driver) const AT_REST: f64 = 0.1;
 
-/// Time in which a gate opens, s: after any trouble the force comes back slowly.
+/// Time for which an opened gate still lets nothing through, s: so zero has surely gone out once.
+const ZERO_S: f64 = 0.01;
+
+/// Time in which a gate opens after that, s: after any trouble the force comes back slowly.
 const OPENING_S: f64 = 0.2;
 
 /// Shortest time between a cut of the force and switching on again, s.
@@ -62,8 +65,9 @@ impl Gate {
 
     /// Part of the force that goes through now, in [0, 1].
     pub(in crate::driver) fn gain(&self) -> f64 {
-        self.opened_at
-            .map_or(0.0, |at| (at.elapsed().as_secs_f64() / OPENING_S).min(1.0))
+        self.opened_at.map_or(0.0, |at| {
+            ((at.elapsed().as_secs_f64() - ZERO_S) / OPENING_S).clamp(0.0, 1.0)
+        })
     }
 }
 
@@ -82,6 +86,9 @@ pub(in crate::driver) fn allowed(
         return Err(DeviceError::NonFiniteWrench {
             device: device.to_owned(),
         });
+    }
+    if gain == 0.0 {
+        return Ok(Wrench::ZERO);
     }
     let limited = Wrench::new(
         limit_length(command.wrench.force, limits.peak_force),

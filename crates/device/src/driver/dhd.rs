@@ -4,6 +4,7 @@
 //! operator, y to the right, z up.
 
 use std::path::PathBuf;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use super::link::Connected;
@@ -87,30 +88,26 @@ impl Dhd {
         arm::start(device, lease, &version)
     }
 
-    /// What is attached, by number.
-    fn look(&self) -> Vec<Listing> {
-        let found = self.load().and_then(|(library, version)| {
-            let _lease = library.lease()?;
-            let count = api::device_count(library).map_err(|failure| refused(library, &failure))?;
-            let count = count.min(LISTED_MAX);
-            let listings: Vec<Listing> = (0..count)
-                .map(|id| Listing {
-                    name: format!("dhd:{id}"),
-                    status: Device::open(library, Some(id))
-                        .map(|device| {
-                            let name = arm::name(&device);
-                            device.close();
-                            format!("{name}, SDK {version}")
-                        })
-                        .map_err(|failure| refused(library, &failure)),
+    /// What is attached, by number; told one by one, for each takes its time.
+    fn look(&self, tell: &Mutex<Vec<Listing>>) -> Result<(), Unavailable> {
+        let (library, version) = self.load()?;
+        let _lease = library.lease()?;
+        let count = api::device_count(library).map_err(|failure| refused(library, &failure))?;
+        if count == 0 {
+            return Err(not_there("no device is attached or switched on"));
+        }
+        for id in 0..count.min(LISTED_MAX) {
+            let status = Device::open(library, Some(id))
+                .map(|device| {
+                    let name = arm::name(&device);
+                    device.close();
+                    format!("{name}, SDK {version}")
                 })
-                .collect();
-            if listings.is_empty() {
-                return Err(not_there("no device is attached or switched on"));
-            }
-            Ok(listings)
-        });
-        found.unwrap_or_else(|error| vec![self.without(error)])
+                .map_err(|failure| refused(library, &failure));
+            let name = format!("dhd:{id}");
+            lock(tell).push(Listing { name, status });
+        }
+        Ok(())
     }
 
     fn without(&self, error: Unavailable) -> Listing {
@@ -132,8 +129,16 @@ impl Family for Dhd {
 
     fn list(&self) -> Vec<Listing> {
         let this = self.clone();
-        library::within(library::LIST_LIMIT, move || this.look())
-            .unwrap_or_else(|| vec![self.without(not_there("the library has not answered so far"))])
+        let told = Arc::new(Mutex::new(Vec::new()));
+        let tell = Arc::clone(&told);
+        let ended = library::within(library::LIST_LIMIT, move || this.look(&tell));
+        let mut listings = std::mem::take(&mut *lock(&told));
+        match ended {
+            Some(Ok(())) => {}
+            Some(Err(error)) => listings.push(self.without(error)),
+            None => listings.push(self.without(not_there("the library has not answered so far"))),
+        }
+        listings
     }
 
     fn open(&self, place: &str) -> Result<Opened, Unavailable> {
@@ -156,6 +161,10 @@ fn id_of(place: &str) -> Result<Option<i8>, Unavailable> {
                 .to_owned(),
         }),
     }
+}
+
+fn lock(listings: &Mutex<Vec<Listing>>) -> MutexGuard<'_, Vec<Listing>> {
+    listings.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn not_there(reason: &str) -> Unavailable {

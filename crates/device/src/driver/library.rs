@@ -64,11 +64,23 @@ impl Spec {
         )
     }
 
+    /// What was tried, in words that are not longer than they must be.
+    fn tried(&self, file: Option<&Path>) -> Vec<String> {
+        if let Some(file) = file {
+            return vec![file.display().to_string()];
+        }
+        let names = self.names.iter().map(|name| (*name).to_owned());
+        let folders = self
+            .folders
+            .iter()
+            .map(|folder| format!("the same in {folder}"));
+        names.chain(folders).collect()
+    }
+
     fn load(&self, given: Option<&Path>) -> Result<(PathBuf, libloading::Library), Unavailable> {
         let named = std::env::var_os(self.variable)
             .filter(|value| !value.is_empty())
             .map(PathBuf::from);
-        let mut tried = Vec::new();
         let mut broken = None;
         for file in self.candidates(given, named.as_deref()) {
             // SAFETY: what a maker's library does when it is loaded cannot be checked; the user installed it for
@@ -80,7 +92,6 @@ impl Spec {
                     if !is_absent(&file, &reason) && broken.is_none() {
                         broken = Some(format!("{} cannot be loaded: {reason}", file.display()));
                     }
-                    tried.push(file.display().to_string());
                 }
             }
         }
@@ -92,7 +103,7 @@ impl Spec {
                 ),
             },
             None => Unavailable::NoLibrary {
-                tried,
+                tried: self.tried(given.or(named.as_deref())),
                 mend: self.mend(),
             },
         })
@@ -112,9 +123,11 @@ fn is_absent(file: &Path, reason: &str) -> bool {
         return !file.exists();
     }
     // The system says of a bare name only in words whether it or a library that it needs was not found.
+    let name = file.display();
     cfg!(windows)
         || reason.contains("no such file")
-        || reason.starts_with(&format!("{}: cannot open", file.display()))
+        || reason.starts_with(&format!("{name}: cannot open"))
+        || reason.ends_with(&format!("library {name}: No such file or directory"))
 }
 
 /// The functions of one maker's library, see [`functions`].

@@ -194,7 +194,6 @@ fn cut_force_is_told() {
 
 /// Has the device cut the force.
 fn trip(stub: &Stub, opened: &mut Opened, cause: f64, word: &str) {
-    stub.set("speed", 0.8);
     stub.set("cause", cause);
     stub.set("force", 0.0);
     message(opened, word);
@@ -208,6 +207,7 @@ fn cut_force_comes_back_only_when_the_handle_rests() {
     let stub = Stub::of("dhd");
     let mut opened = open(&stub);
     drive(&stub, &mut opened);
+    stub.set("speed", 0.8);
     trip(&stub, &mut opened, 2.0, "too fast");
     let begun = Instant::now();
     drive_until(&mut opened, wrench(), "a while in motion", |_| {
@@ -467,6 +467,21 @@ fn list_names_each_device_and_why_one_is_not_to_be_had() {
     assert!(family(&stub).list().len() <= 16);
     stub.set("count", -1.0);
     assert!(family(&stub).list()[0].status.is_err());
+}
+
+#[test]
+fn list_tells_what_it_has_found_where_the_library_does_not_come_back() {
+    let stub = Stub::of("dhd");
+    stub.set("count", 2.0);
+    stub.set("hold:dhdOpenID 1", 1.0);
+    let listings = family(&stub).list();
+    stub.set("hold:dhdOpenID 1", 0.0);
+    assert_eq!(listings.len(), 2);
+    assert!(listings[0].name == "dhd:0" && listings[0].status.is_ok());
+    assert!(matches!(
+        listings[1].status,
+        Err(Unavailable::NotThere { .. })
+    ));
 }
 
 #[test]

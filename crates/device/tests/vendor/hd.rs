@@ -68,6 +68,7 @@ fn device_is_made_ready_in_order_and_left_with_zero_force() {
         "hdEnable 0x4000",
         "hdScheduleAsynchronous 65535",
         "hdStartScheduler",
+        "hdMakeCurrentDevice 7",
         "hdSetDoublev 0x2700 0 0 0",
     ];
     assert_eq!(calls[..begun.len()], begun);
@@ -400,6 +401,9 @@ fn scheduler_that_does_not_start_and_device_that_does_not_answer_are_told() {
             assert!(error.to_string().contains("stub says no"), "{error}");
         }
     }
+    // Motors that are warm from before are no reason not to begin.
+    stub.set("init error", f64::from(0x0200));
+    stub.set("error at init", 1.0);
     drop(open(&stub));
 }
 

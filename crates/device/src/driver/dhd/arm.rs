@@ -93,6 +93,7 @@ pub(super) fn start(device: Device, lease: Lease, version: &str) -> Result<Conne
         readiness: Readiness::Waiting("the forces are being switched on"),
         hand: HandPresence::Unknown,
         enabled_at: None,
+        cut_at: None,
         speed: f64::INFINITY,
     };
     let mut notes = vec![format!("Force Dimension SDK {version}")];
@@ -130,6 +131,8 @@ struct Arm {
     hand: HandPresence,
     /// When the forces were last switched on; never before the device is calibrated.
     enabled_at: Option<Instant>,
+    /// Since when the forces are off, after they were switched on.
+    cut_at: Option<Instant>,
     /// Of the handle at the last sample, m/s.
     speed: f64,
 }
@@ -245,10 +248,21 @@ impl Arm {
         if let Readiness::Tripped(why) = self.readiness {
             self.notices.say(why, || why.to_owned());
         }
+        if status.has_force || self.enabled_at.is_none() {
+            self.cut_at = None;
+        } else {
+            self.cut_at.get_or_insert_with(Instant::now);
+        }
+        self.enable_again(&status)
+    }
+
+    /// Switches the forces on where the device is calibrated meanwhile, or has cut them a while ago, and rests.
+    fn enable_again(&mut self, status: &Status) -> Result<(), Failure> {
         let is_usable = status.has_power && status.is_calibrated && !status.has_error;
-        let is_due = self
-            .enabled_at
-            .is_none_or(|at| at.elapsed().as_secs_f64() > REST_S);
+        let is_due = [self.enabled_at, self.cut_at]
+            .iter()
+            .flatten()
+            .all(|at| at.elapsed().as_secs_f64() > REST_S);
         let is_wanted = self.enabled_at.is_none() || status.force_off_cause != BUTTON;
         if is_usable && !status.has_force && is_due && is_wanted && self.speed < AT_REST {
             self.set_wrench([0.0; 6])?;

@@ -125,22 +125,28 @@ impl Device {
         // SAFETY: a text that ends with a zero, or null for the default device.
         let handle = unsafe { (functions.init)(name.map_or(std::ptr::null(), CStr::as_ptr)) };
         let device = Self { library, handle };
-        let failure = device.errors().last().map(|code| device.failure(code));
-        match failure {
+        // What is too warm or was too fast before is no reason not to begin; the rest is.
+        let errors: Vec<u32> = device.errors().collect();
+        let fatal = errors.iter().find(|code| *code >> 8 >= 3);
+        let reason = if handle == INVALID {
+            fatal.or(errors.last())
+        } else {
+            fatal
+        };
+        match reason {
             None if handle == INVALID => Err(Failure {
                 code: 0,
                 text: "hdInitDevice gave no device and no reason".to_owned(),
             }),
             None => {
-                // SAFETY: a handle that was just given.
-                unsafe { (functions.make_current)(handle) };
+                device.make_current();
                 Ok(device)
             }
-            Some(failure) => {
+            Some(code) => {
                 if handle != INVALID {
                     device.disable();
                 }
-                Err(failure)
+                Err(device.failure(*code))
             }
         }
     }
@@ -148,6 +154,11 @@ impl Device {
     pub(super) fn disable(&self) {
         // SAFETY: numbers only; the owner calls nothing after this.
         unsafe { (self.functions().disable_device)(self.handle) };
+    }
+
+    pub(super) fn make_current(&self) {
+        // SAFETY: numbers only.
+        unsafe { (self.functions().make_current)(self.handle) };
     }
 
     pub(super) fn begin_frame(&self) {

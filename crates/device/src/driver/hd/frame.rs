@@ -102,6 +102,10 @@ impl Frames {
         let is_calibration_due = newest.frame.is_multiple_of(CALIBRATION_EVERY);
         newest.frame += 1;
 
+        if newest.at.is_none() {
+            // The current device may be a matter of the thread.
+            device.make_current();
+        }
         newest.at = Some(Instant::now());
         device.begin_frame();
         newest.transform = device.doubles(number::TRANSFORM);
@@ -179,4 +183,46 @@ pub(super) unsafe extern "C" fn frame(data: *mut c_void) -> c_uint {
     let frames = unsafe { &mut *data.cast::<Frames>() };
     frames.run();
     CONTINUE
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    fn wanted(force: f64, torque: f64, age: Duration) -> Wanted {
+        Wanted {
+            force: [force; 3],
+            torque: [torque; 3],
+            at: Instant::now().checked_sub(age).unwrap(),
+            switch_on: 0,
+            is_leaving: false,
+        }
+    }
+
+    #[test]
+    fn wrench_that_the_link_does_not_renew_fades_to_zero() {
+        let fresh = wanted(2.0, 30.0, Duration::ZERO);
+        assert_eq!(rendered(&fresh), ([2.0; 3], [30.0; 3]));
+        let ([fading, ..], _) = rendered(&wanted(2.0, 30.0, Duration::from_millis(35)));
+        assert!(fading < 2.0);
+        let stale = wanted(2.0, 30.0, Duration::from_millis(51));
+        assert_eq!(rendered(&stale), ([0.0; 3], [0.0; 3]));
+    }
+
+    #[test]
+    fn nothing_that_is_not_finite_is_rendered_and_nothing_at_the_end() {
+        for bad in [f64::NAN, f64::INFINITY] {
+            for numbers in [(bad, 0.0), (0.0, bad)] {
+                let wanted = wanted(numbers.0, numbers.1, Duration::ZERO);
+                assert_eq!(rendered(&wanted), ([0.0; 3], [0.0; 3]));
+            }
+        }
+        let leaving = Wanted {
+            is_leaving: true,
+            ..wanted(2.0, 30.0, Duration::ZERO)
+        };
+        assert_eq!(rendered(&leaving), ([0.0; 3], [0.0; 3]));
+    }
 }

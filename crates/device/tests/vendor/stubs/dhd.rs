@@ -49,7 +49,7 @@ pub extern "C" fn dhdOpen() -> c_int {
 pub extern "C" fn dhdOpenID(id: i8) -> c_int {
     log(format!("dhdOpenID {id}"));
     let is_taken = f64::from(id) == knob("taken", -1.0);
-    if fails("dhdOpenID") || is_taken {
+    if fails("dhdOpenID") || fails(&format!("dhdOpenID {id}")) || is_taken {
         -1
     } else {
         0

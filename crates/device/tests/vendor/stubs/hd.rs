@@ -61,6 +61,9 @@ pub unsafe extern "C" fn hdInitDevice(name: *const c_char) -> c_uint {
         error(knob("init error", 768.0) as u32);
         return 0xFFFF_FFFF;
     }
+    if knob("error at init", 0.0) == 1.0 {
+        error(knob("init error", 768.0) as u32);
+    }
     DEVICE
 }
 

@@ -51,6 +51,9 @@ fn check_period(period_s: f64) -> Result<(), DeviceError> {
 
 /// Real time: releases at t₀ + kT of the monotonic clock, slept to and then spun to.
 ///
+/// A loop at 10 kHz with real-time priority must not spin all the time, or the system takes the processor
+/// away from it for some 50 ms in each second: [`with_spin`](Self::with_spin).
+///
 /// t₀ is the first call of [`wait`](Clock::wait). A scheduled time that has gone by is skipped, never
 /// made up for: after a miss the loop waits for the next scheduled time.
 #[derive(Debug, Clone)]
@@ -78,6 +81,21 @@ impl RealTime {
             first: None,
             scheduled: Instant::now(),
             sleeper: spin_sleep::SpinSleeper::default(),
+        })
+    }
+
+    /// The same, spinning only for the last `spin_s` before a scheduled time (s, at most half a period is
+    /// taken): for a thread that wakes on time, as one with real-time priority does.
+    ///
+    /// # Errors
+    /// Where the period is not within 10 µs to 1 s, or `spin_s` not within 0 to 10 ms.
+    pub fn with_spin(period_s: f64, spin_s: f64) -> Result<Self, DeviceError> {
+        let is_allowed = (0.0..=0.01).contains(&spin_s);
+        check_setting("spin_s", spin_s, is_allowed, "from 0 to 0.01 s")?;
+        let nanoseconds = (spin_s.min(0.5 * period_s) * 1e9).round() as u32;
+        Ok(Self {
+            sleeper: spin_sleep::SpinSleeper::new(nanoseconds),
+            ..Self::new(period_s)?
         })
     }
 }
@@ -264,6 +282,19 @@ mod tests {
         assert_eq!(next_slot(0.5e-3, 1e-3, 1), 1);
         assert_eq!(next_slot(7.2e-3, 1e-3, 3), 8);
         assert_eq!(next_slot(0.0, 1e-3, 3), 3);
+    }
+
+    #[test]
+    fn ten_kilohertz_with_a_short_spin_skips_no_number() {
+        let mut clock = RealTime::with_spin(1e-4, 3e-5).unwrap();
+        for k in 0..200_u64 {
+            let release = clock.wait();
+            assert_eq!(release.index, k);
+            assert!(release.wake_delay_s >= 0.0);
+        }
+        for bad in [-1.0, f64::NAN, 1.0] {
+            assert!(RealTime::with_spin(1e-3, bad).is_err());
+        }
     }
 
     #[test]

@@ -9,15 +9,17 @@
 //!
 //! - [`HapticDevice`] is what a driver offers, [`Limits`] what its hardware can do.
 //! - [`driver::simulated`] is a device that needs no hardware: the figures of a Virtuose 6D, held by
-//!   the scripted [`SimulatedHand`].
+//!   the scripted [`SimulatedHand`]; and models of other devices with bodies of their own.
 //! - [`Mapping`] places the handle in the scene: axes, scale, clutch, and the wrench back.
 //! - [`VelocityEstimator`] tells velocities from poses where a device reports none.
-//! - [`VirtualCoupling`] ties the simulated tool to the handle.
+//! - [`VirtualCoupling`] ties the simulated tool to the handle; [`ChosenCoupling`] is as stiff as a
+//!   device bears, and [`stability`] says where it would shake.
 //! - [`Safety`] stands between the simulation and the hand: no wrench beyond the limits, nothing that
-//!   is not finite, no jump; each intervention is counted.
+//!   is not finite, no jump; in a live session also no energy of its own, no heat, nothing old, and no
+//!   force that was not armed. Each intervention is counted.
 //! - [`Servo`] runs the loop on a [`Clock`]: [`RealTime`], [`AsFastAsPossible`] or, in tests,
 //!   [`Driven`]. The loop sees the same times on each, so a headless run and a felt one are the same
-//!   computation.
+//!   computation. [`Realtime`] asks the system to let the loop be on time.
 //!
 //! This crate knows poses, wrenches and time, and nothing of meshes or contacts.
 //!
@@ -81,6 +83,7 @@ mod hand;
 mod haptic_device;
 mod histogram;
 mod mapping;
+mod realtime;
 mod safety;
 mod script;
 mod servo;
@@ -97,7 +100,11 @@ pub use error::DeviceError;
 pub use hand::{Guide, HandSettings, SimulatedHand};
 pub use haptic_device::{Command, HandPresence, HandleState, HapticDevice, Limits, Readiness};
 pub use histogram::{TimeHistogram, TimeSummary};
+<<<<<<< HEAD
 pub use mapping::{Mapping, MappingSettings, Rotation};
+=======
+pub use realtime::{Granted, Realtime};
+>>>>>>> 2979a59 (Real time: priority and locked memory where the system permits, and a clock that spins for less)
 pub use safety::{
     Arming, ArmingSettings, HeatingSettings, ObservedEnergy, PassivitySettings, PortSettings,
     Safety, SafetyEvents, SafetySettings, WaitsFor, Watchdog,

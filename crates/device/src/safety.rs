@@ -136,10 +136,13 @@ impl Safety {
         if let Some(heating) = &mut self.heating {
             heating.feed(self.last_wrench.force, elapsed_s);
         }
-        if let (Some(passivity), Some(handle)) = (&mut self.passivity, &handle)
-            && self.samples.is_good()
-        {
-            passivity.observe(handle, &self.last_wrench, elapsed_s);
+        if let Some(passivity) = &mut self.passivity {
+            passivity.sent(&self.last_wrench);
+            if let Some(handle) = &handle
+                && self.samples.is_good()
+            {
+                passivity.observe(handle, elapsed_s);
+            }
         }
         handle
     }

@@ -125,14 +125,23 @@ fn swing(case: &Case, stiffness: f64, periods: u32) -> (f64, f64) {
     (first, last)
 }
 
-/// Every thirteenth case, 5 % below and above the edge: what sessions run, without friction, encoder and hand.
+/// Every thirteenth case, 5 % below and above the edge: what sessions run, without friction, encoder and hand. The
+/// slowest of them (1 kg, 0.1 N s/m) grows and decays by 5 % of b/2m, 7 % within the 30 s of its run.
 #[test]
 fn simulated_device_itself_is_stable_below_the_edge_and_not_above() {
     for case in cases().iter().step_by(13) {
         let (first, last) = swing(case, 0.95 * case.critical, 120_000);
-        assert!(last < first, "{:?} below: {first} {last}", case.plant);
+        assert!(
+            last < 0.98 * first,
+            "{:?} below: {first} {last}",
+            case.plant
+        );
         let (first, last) = swing(case, 1.05 * case.critical, 120_000);
-        assert!(last > 1.5 * first, "{:?} above: {first} {last}", case.plant);
+        assert!(
+            last > 1.02 * first,
+            "{:?} above: {first} {last}",
+            case.plant
+        );
     }
 }
 

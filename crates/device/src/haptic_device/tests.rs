@@ -2,7 +2,9 @@
 
 use super::*;
 
-fn refused(change: fn(&mut Limits)) -> Option<&'static str> {
+type Change = fn(&mut Limits);
+
+fn refused(change: Change) -> Option<&'static str> {
     let mut limits = Limits::virtuose_6d();
     change(&mut limits);
     match limits.check() {
@@ -24,28 +26,28 @@ fn limits_of_a_device_for_input_alone_pass() {
 #[test]
 fn each_absurd_limit_is_refused_by_its_name() {
     for bad in [
-        (|l| l.workspace_half_extents.y = f64::NAN) as fn(&mut Limits),
+        (|l| l.workspace_half_extents.y = f64::NAN) as Change,
         |l| l.workspace_half_extents.z = 0.0,
         |l| l.workspace_half_extents.x = 1e9,
     ] {
         assert_eq!(refused(bad), Some("workspace_half_extents"));
     }
     for bad in [
-        (|l| l.peak_force = f64::INFINITY) as fn(&mut Limits),
+        (|l| l.peak_force = f64::INFINITY) as Change,
         |l| l.peak_force = -35.0,
         |l| l.peak_force = 35_000.0,
     ] {
         assert_eq!(refused(bad), Some("peak_force"));
     }
     for bad in [
-        (|l| l.continuous_force = f64::NAN) as fn(&mut Limits),
+        (|l| l.continuous_force = f64::NAN) as Change,
         |l| l.continuous_force = 36.0,
         |l| l.continuous_force = 0.0,
         |l| l.peak_force = 0.0,
     ] {
         assert_eq!(refused(bad), Some("continuous_force"));
     }
-    let named: [(&str, fn(&mut Limits)); 9] = [
+    let named: [(&str, Change); 9] = [
         ("peak_torque", |l| l.peak_torque = -1.0),
         ("position_resolution", |l| l.position_resolution = 1.0),
         ("force_resolution", |l| l.force_resolution = f64::NAN),

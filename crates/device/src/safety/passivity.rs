@@ -22,7 +22,14 @@ pub struct PassivitySettings {
     /// Time in which observed energy is forgotten, s, in both directions: what was dissipated long ago must not hide
     /// what comes out now. Default 10: longer than a snap-fit is held half way. Nominal 1 to 60.
     pub bleed_s: f64,
+    /// Time from a force that goes out to the hand that feels it, s: the work is done by the force that has arrived.
+    /// Default 1e-3, assumed: a tick of the link; nominal 0 to 31 periods, longer is taken as that. Too long a delay
+    /// damps contact more than is needed, too short a one lets a shaking wall pass for a passive one.
+    pub delay_s: f64,
 }
+
+/// Wrenches that are remembered while they are on their way.
+const SENT: usize = 32;
 
 /// One of the two ports: N, m, J or N m, rad, J.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,6 +71,7 @@ impl PassivitySettings {
                 store: 0.1 * torque,
             },
             bleed_s: 10.0,
+            delay_s: 1e-3,
         }
     }
 }
@@ -154,10 +162,10 @@ impl Port {
 /// E ← E(1 − T/(τ + T)) − F·Δx, at most the store          E < 0:  α = min(−E/(T|v|²), α_max),  F' = F − α v
 /// |F'| ≤ F_max (1 + E/A) where E < 0
 /// ```
-/// E: energy from the hand into the device (J), with the force F on the hand as it really went out and the way Δx
-/// that the handle then went; T period, v velocity, A allowance. The last line is what makes the bound absolute: with
-/// a period's way of at most Δx, E never falls below −max(A, F_max Δx), whatever the simulation wants and whatever
-/// the damping achieves. Real-time: no allocation.
+/// E: energy from the hand into the device (J), with the force F on the hand as it really went out, d periods of delay
+/// ago, and the way Δx that the handle then went; T period, v velocity, A allowance. The last line is what makes the
+/// bound absolute: with a period's way of at most Δx, E never falls below −A − (d + 1) F_max Δx, for d = 0 not below
+/// −max(A, F_max Δx), whatever the simulation wants and whatever the damping achieves. Real-time: no allocation.
 ///
 /// Source: Hannaford and Ryu 2002 (observer and controller); the guards are ours.
 #[derive(Debug, Clone)]
@@ -165,6 +173,10 @@ pub(super) struct Passivity {
     translation: Port,
     rotation: Port,
     bleed_s: f64,
+    delay_s: f64,
+    /// What went out in the last periods; the newest at `newest`.
+    sent: [Wrench; SENT],
+    newest: usize,
     last: Option<DPose3>,
     linear_velocity: DVec3,
     angular_velocity: DVec3,
@@ -173,18 +185,29 @@ pub(super) struct Passivity {
 impl Passivity {
     pub(super) fn new(settings: &PassivitySettings) -> Result<Self, DeviceError> {
         check_positive("bleed_s", settings.bleed_s)?;
+        check_not_negative("delay_s", settings.delay_s)?;
         Ok(Self {
             translation: Port::new(settings.translation)?,
             rotation: Port::new(settings.rotation)?,
             bleed_s: settings.bleed_s,
+            delay_s: settings.delay_s,
+            sent: [Wrench::ZERO; SENT],
+            newest: 0,
             last: None,
             linear_velocity: DVec3::ZERO,
             angular_velocity: DVec3::ZERO,
         })
     }
 
-    /// Accounts for the way to a good sample, under the wrench that went out before it.
-    pub(super) fn observe(&mut self, handle: &HandleState, rendered: &Wrench, elapsed_s: f64) {
+    /// Remembers what went out in a period. To be called once a period.
+    pub(super) fn sent(&mut self, wrench: &Wrench) {
+        self.newest = (self.newest + 1) % SENT;
+        self.sent[self.newest] = *wrench;
+    }
+
+    /// Accounts for the way to a good sample, under the wrench that had arrived before it.
+    pub(super) fn observe(&mut self, handle: &HandleState, elapsed_s: f64) {
+        let rendered = self.arrived(elapsed_s);
         self.linear_velocity = handle.linear_velocity;
         self.angular_velocity = handle.angular_velocity;
         let Some(last) = self.last.replace(handle.pose) else {
@@ -195,6 +218,13 @@ impl Passivity {
         let turn = rotation_vector(handle.pose.rotation * last.rotation.inverse());
         self.translation.observe(rendered.force, way, bled);
         self.rotation.observe(rendered.torque, turn, bled);
+    }
+
+    /// What the hand felt in a period of this length, s.
+    fn arrived(&self, elapsed_s: f64) -> Wrench {
+        // Not a number, as without time, becomes 0.
+        let delay = (self.delay_s / elapsed_s).round() as usize;
+        self.sent[(self.newest + SENT - delay.min(SENT - 1)) % SENT]
     }
 
     /// The wrench with damping where energy came out, within what the allowance leaves.

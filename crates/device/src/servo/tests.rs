@@ -8,6 +8,7 @@ use crate::clock::{AsFastAsPossible, Driven, RealTime};
 use crate::driver::simulated::{Simulated, SimulatedSettings};
 use crate::hand::{HandSettings, SimulatedHand};
 use crate::haptic_device::Command;
+use crate::safety::WaitsFor;
 use crate::script::{Insertion, Script};
 
 const T: f64 = 1e-3;
@@ -272,4 +273,114 @@ fn device_that_fails_while_the_wrench_goes_is_stopped_at_once() {
     servo.release(&mut device);
     assert_eq!(device.stops, 1);
     assert_eq!(device.written.len(), 1);
+}
+
+fn live_servo(clock: Driven) -> Servo<Driven> {
+    Servo::new(clock, ServoSettings::live(&Limits::virtuose_6d()).unwrap()).unwrap()
+}
+
+#[test]
+fn live_session_outlives_a_lost_device_and_arms_again_when_it_is_back() {
+    let mut servo = live_servo(Driven::new(T).unwrap());
+    let mut device = Bench::at_origin();
+    let mut step = |device: &mut Bench, x: f64| servo.step(device, |_| push(x)).unwrap();
+    for _ in 0..400 {
+        step(&mut device, 0.0);
+    }
+    for _ in 0..20 {
+        step(&mut device, 20.0);
+    }
+    assert_eq!(device.written.last(), Some(&push(20.0)));
+    // Away for five seconds: neither reads nor writes.
+    device.is_writable = false;
+    device.reads = (0..5000).map(|_| Err(Bench::no_answer())).collect();
+    let record = (0..5000).map(|_| step(&mut device, 20.0)).last().unwrap();
+    assert_eq!(record.wrench_on_handle, Wrench::ZERO);
+    assert_eq!(record.arming, Arming::Waiting(WaitsFor::Samples));
+    // Back, with the tool still in contact: no force until it was small.
+    device.is_writable = true;
+    let record = (0..500).map(|_| step(&mut device, 20.0)).last().unwrap();
+    assert_eq!(record.arming, Arming::Waiting(WaitsFor::SmallForce));
+    assert_eq!(record.wrench_on_handle, Wrench::ZERO);
+    for _ in 0..400 {
+        step(&mut device, 0.0);
+    }
+    let record = (0..20).map(|_| step(&mut device, 20.0)).last().unwrap();
+    assert_eq!(
+        (record.arming, record.wrench_on_handle),
+        (Arming::Armed, push(20.0))
+    );
+    let report = servo.report();
+    assert_eq!((report.read_failures, report.write_failures), (5000, 5000));
+    assert_eq!(
+        (report.safety.trips_samples_lost, report.safety.trips()),
+        (1, 1)
+    );
+    assert_eq!(report.arming, Arming::Armed);
+}
+
+#[test]
+fn simulation_may_answer_with_a_wrench_a_command_or_an_old_result() {
+    let mut servo = servo(Driven::new(T).unwrap());
+    let mut device = Bench::at_origin();
+    let stiff = Command {
+        wrench: push(2.0),
+        stiffness: glam::DMat3::IDENTITY * -300.0,
+    };
+    let mut wrench = |servo: &mut Servo<Driven>| device_force(servo.step(&mut device, |_| stiff));
+    assert_eq!(wrench(&mut servo), 2.0);
+    let old = Answer {
+        command: stiff,
+        age_s: 0.03,
+    };
+    let old_wrench =
+        |servo: &mut Servo<Driven>| device_force(servo.step(&mut Bench::at_origin(), |_| old));
+    let faded = old_wrench(&mut servo);
+    assert!((faded - 1.0).abs() < 1e-12, "{faded}");
+    let gone = servo
+        .step(&mut Bench::at_origin(), |_| Answer { age_s: 0.06, ..old })
+        .unwrap();
+    assert_eq!(gone.wrench_on_handle, Wrench::ZERO);
+    assert_eq!(servo.report().safety.answers_stale, 2);
+}
+
+fn device_force(record: Result<PeriodRecord, DeviceError>) -> f64 {
+    record.unwrap().wrench_on_handle.force.x
+}
+
+#[test]
+fn loop_that_was_held_up_for_long_makes_up_for_nothing_and_arms_again() {
+    let mut clock = Driven::new(T).unwrap();
+    for _ in 0..420 {
+        clock.push(0.0, 1e-4);
+    }
+    clock.push(0.0, 3.0);
+    let mut servo = live_servo(clock);
+    let mut device = Bench::at_origin();
+    let mut calls = 0;
+    for k in 0..500 {
+        let force = if k < 400 { 0.0 } else { 10.0 };
+        servo
+            .step(&mut device, |_| {
+                calls += 1;
+                push(force)
+            })
+            .unwrap();
+    }
+    // One call and one write a period, whatever was missed.
+    assert_eq!((calls, device.written.len()), (500, 500));
+    let report = servo.report();
+    assert_eq!((report.skipped, report.safety.trips_stalled), (2999, 1));
+    assert_eq!(device.written[419], push(10.0));
+    assert!(device.written[421..].iter().all(|w| *w == Wrench::ZERO));
+}
+
+#[test]
+fn live_session_that_was_never_armed_ends_at_once() {
+    let mut servo = live_servo(Driven::new(T).unwrap());
+    let mut device = Bench::at_origin();
+    servo.run_periods(&mut device, 100, |_| push(20.0)).unwrap();
+    assert_eq!(device.written.len(), 100);
+    assert!(device.written.iter().all(|w| *w == Wrench::ZERO));
+    assert!(device.stops >= 1);
 }

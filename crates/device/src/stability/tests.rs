@@ -2,6 +2,9 @@
 
 use super::*;
 
+/// Real roots and conjugate pairs (re, im).
+type Roots = (&'static [f64], &'static [(f64, f64)]);
+
 /// Roots given as real numbers and conjugate pairs (re, im), multiplied out.
 fn polynomial(real: &[f64], pairs: &[(f64, f64)]) -> Vec<f64> {
     let mut p = vec![1.0];
@@ -25,7 +28,7 @@ fn polynomial(real: &[f64], pairs: &[(f64, f64)]) -> Vec<f64> {
 
 #[test]
 fn roots_are_told_inside_from_outside_the_unit_circle() {
-    let inside: [(&[f64], &[(f64, f64)]); 4] = [
+    let inside: [Roots; 4] = [
         (&[0.5], &[]),
         (&[0.999, -0.999, 0.0], &[]),
         (&[0.3], &[(0.7, 0.7), (-0.9, 0.4)]),
@@ -34,7 +37,7 @@ fn roots_are_told_inside_from_outside_the_unit_circle() {
     for (real, pairs) in inside {
         assert!(all_inside_unit_circle(&mut polynomial(real, pairs)));
     }
-    let outside: [(&[f64], &[(f64, f64)]); 4] = [
+    let outside: [Roots; 4] = [
         (&[1.0001], &[]),
         (&[0.999, -1.001, 0.0], &[]),
         (&[0.3], &[(0.71, 0.71), (-0.9, 0.4)]),

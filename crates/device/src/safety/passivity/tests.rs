@@ -24,6 +24,7 @@ fn settings() -> PassivitySettings {
             store: 0.05,
         },
         bleed_s: 1e12,
+        delay_s: 0.0,
     }
 }
 
@@ -42,9 +43,15 @@ fn push(x: f64) -> Wrench {
     Wrench::new(DVec3::X * x, DVec3::ZERO)
 }
 
+/// A period in which a wrench went out, and where the handle then was.
+fn went(passivity: &mut Passivity, out: &Wrench, handle: &HandleState) {
+    passivity.sent(out);
+    passivity.observe(handle, T);
+}
+
 fn passivity() -> Passivity {
     let mut passivity = Passivity::new(&settings()).unwrap();
-    passivity.observe(&at(0.0, 0.0, 0.0), &Wrench::ZERO, T);
+    went(&mut passivity, &Wrench::ZERO, &at(0.0, 0.0, 0.0));
     passivity
 }
 
@@ -52,9 +59,9 @@ fn passivity() -> Passivity {
 fn energy_is_force_times_way_with_the_sign_of_what_goes_in() {
     let mut passivity = passivity();
     // The hand pushes against 5 N over 2 mm: 10 mJ go in. Back under 3 N: 6 mJ come out.
-    passivity.observe(&at(-2e-3, 0.0, 0.0), &push(5.0), T);
+    went(&mut passivity, &push(5.0), &at(-2e-3, 0.0, 0.0));
     assert!((passivity.energy().translation - 10e-3).abs() < 1e-12);
-    passivity.observe(&at(0.0, 0.0, 0.0), &push(3.0), T);
+    went(&mut passivity, &push(3.0), &at(0.0, 0.0, 0.0));
     assert!((passivity.energy().translation - 4e-3).abs() < 1e-12);
     assert_eq!(passivity.energy().rotation, 0.0);
     assert_eq!(passivity.lowest(), ObservedEnergy::default());
@@ -65,7 +72,7 @@ fn force_and_torque_have_accounts_of_their_own() {
     let mut passivity = passivity();
     let turn = Wrench::new(DVec3::ZERO, DVec3::Z * 0.5);
     // 0.5 N m over 0.01 rad comes out: 5 mJ of debt in rotation alone.
-    passivity.observe(&at(0.0, 0.01, 0.3), &turn, T);
+    went(&mut passivity, &turn, &at(0.0, 0.01, 0.3));
     let energy = passivity.energy();
     assert_eq!(energy.translation, 0.0);
     assert!((energy.rotation + 5e-3).abs() < 1e-9);
@@ -83,11 +90,11 @@ fn debt_is_damped_by_what_takes_it_back_in_a_period_and_no_more_than_the_device_
     let mut passivity = passivity();
     let mut events = SafetyEvents::default();
     // A debt of 0.1 mJ at 0.5 m/s: alpha = 1e-4/(1e-3 0.25) = 0.4 N s/m, so 0.2 N.
-    passivity.observe(&at(1e-4, 0.0, 0.5), &push(1.0), T);
+    went(&mut passivity, &push(1.0), &at(1e-4, 0.0, 0.5));
     let passed = passivity.pass(&push(3.0), T, &mut events);
     assert!((passed.force.x - 2.8).abs() < 1e-12);
     // A debt of 10 mJ asks for 40 N s/m: 4 is the most.
-    passivity.observe(&at(1e-3 + 1e-4, 0.0, 0.5), &push(9.9), T);
+    went(&mut passivity, &push(9.9), &at(1e-3 + 1e-4, 0.0, 0.5));
     let passed = passivity.pass(&push(3.0), T, &mut events);
     assert!((passed.force.x - 1.0).abs() < 1e-12);
     assert_eq!(events.passivity_damped, 2);
@@ -97,12 +104,43 @@ fn debt_is_damped_by_what_takes_it_back_in_a_period_and_no_more_than_the_device_
 fn nothing_is_damped_near_standstill_or_without_debt() {
     let mut passivity = passivity();
     let mut events = SafetyEvents::default();
-    passivity.observe(&at(1e-4, 0.0, 1.9e-3), &push(1.0), T);
+    went(&mut passivity, &push(1.0), &at(1e-4, 0.0, 1.9e-3));
     assert_eq!(passivity.pass(&push(3.0), T, &mut events), push(3.0));
-    passivity.observe(&at(0.0, 0.0, -0.1), &push(5.0), T);
+    went(&mut passivity, &push(5.0), &at(0.0, 0.0, -0.1));
     assert!(passivity.energy().translation > 0.0);
     assert_eq!(passivity.pass(&push(30.0), T, &mut events), push(30.0));
     assert_eq!(events, SafetyEvents::default());
+}
+
+#[test]
+fn work_is_done_by_the_force_that_has_arrived() {
+    let mut settings = settings();
+    settings.delay_s = 2.0 * T;
+    let mut passivity = Passivity::new(&settings).unwrap();
+    let mut x = 0.0;
+    for (out, expected) in [
+        (1.0, 0.0),
+        (2.0, 0.0),
+        (3.0, -1e-3),
+        (4.0, -3e-3),
+        (0.0, -6e-3),
+    ] {
+        went(&mut passivity, &push(out), &at(x, 0.0, 0.0));
+        assert!((passivity.energy().translation - expected).abs() < 1e-12);
+        x += 1e-3;
+    }
+    // A longer one than is remembered is the longest.
+    settings.delay_s = 1.0;
+    let mut passivity = Passivity::new(&settings).unwrap();
+    for k in 0..40 {
+        went(
+            &mut passivity,
+            &push(1.0),
+            &at(1e-4 * f64::from(k), 0.0, 0.0),
+        );
+    }
+    assert!((passivity.energy().translation + 9e-4).abs() < 1e-12);
+    assert!(passivity.arrived(0.0).is_finite());
 }
 
 #[test]
@@ -110,11 +148,11 @@ fn what_is_stored_is_no_more_than_the_store_and_is_forgotten() {
     let mut settings = settings();
     settings.bleed_s = 10.0;
     let mut passivity = Passivity::new(&settings).unwrap();
-    passivity.observe(&at(0.0, 0.0, 0.0), &Wrench::ZERO, T);
-    passivity.observe(&at(-0.1, 0.0, 0.0), &push(10.0), T);
+    went(&mut passivity, &Wrench::ZERO, &at(0.0, 0.0, 0.0));
+    went(&mut passivity, &push(10.0), &at(-0.1, 0.0, 0.0));
     assert_eq!(passivity.energy().translation, 0.05);
     for _ in 0..10_000 {
-        passivity.observe(&at(-0.1, 0.0, 0.0), &push(10.0), T);
+        went(&mut passivity, &push(10.0), &at(-0.1, 0.0, 0.0));
     }
     // e⁻¹ of it after the time constant.
     assert!((passivity.energy().translation / 0.05 - 0.368).abs() < 0.001);
@@ -139,7 +177,11 @@ fn whatever_the_simulation_wants_the_debt_stays_below_its_bound() {
         let passed = passivity.pass(&wanted, T, &mut events);
         let force = limit_length(passed.force, 10.0);
         x += way;
-        passivity.observe(&at(x, 0.0, way / T), &Wrench::new(force, DVec3::ZERO), T);
+        went(
+            &mut passivity,
+            &Wrench::new(force, DVec3::ZERO),
+            &at(x, 0.0, way / T),
+        );
     }
     // A = 20 mJ = 10 N over 2 mm.
     let lowest = passivity.lowest().translation;
@@ -162,7 +204,7 @@ fn a_device_without_force_has_nothing_to_account_for() {
     let mut passivity = Passivity::new(&settings).unwrap();
     let mut events = SafetyEvents::default();
     for k in 0..10 {
-        passivity.observe(&at(f64::from(k), 0.1, 0.5), &Wrench::ZERO, T);
+        went(&mut passivity, &Wrench::ZERO, &at(f64::from(k), 0.1, 0.5));
         assert!(passivity.pass(&push(1.0), T, &mut events).is_finite());
     }
     assert_eq!(passivity.energy(), ObservedEnergy::default());
@@ -179,6 +221,7 @@ fn settings_out_of_range_are_refused_by_name() {
         }
     };
     assert_eq!(refused(|s| s.bleed_s = 0.0), "bleed_s");
+    assert_eq!(refused(|s| s.delay_s = f64::NAN), "delay_s");
     assert_eq!(
         refused(|s| s.rotation.damping_max = f64::NAN),
         "damping_max"

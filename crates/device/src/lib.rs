@@ -100,11 +100,8 @@ pub use error::DeviceError;
 pub use hand::{Guide, HandSettings, SimulatedHand};
 pub use haptic_device::{Command, HandPresence, HandleState, HapticDevice, Limits, Readiness};
 pub use histogram::{TimeHistogram, TimeSummary};
-<<<<<<< HEAD
 pub use mapping::{Mapping, MappingSettings, Rotation};
-=======
 pub use realtime::{Granted, Realtime};
->>>>>>> 2979a59 (Real time: priority and locked memory where the system permits, and a clock that spins for less)
 pub use safety::{
     Arming, ArmingSettings, HeatingSettings, ObservedEnergy, PassivitySettings, PortSettings,
     Safety, SafetyEvents, SafetySettings, WaitsFor, Watchdog,

@@ -194,7 +194,11 @@ pub fn open(name: &str) -> Result<Opened, Unavailable> {
             ),
         });
     };
-    let opened = family.open(place)?;
+    checked(family.open(place)?)
+}
+
+/// Nothing is rendered by limits that no device has.
+fn checked(opened: Opened) -> Result<Opened, Unavailable> {
     match opened.device.limits().check() {
         Ok(()) => Ok(opened),
         Err(error) => Err(Unavailable::Failed {

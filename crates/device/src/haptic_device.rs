@@ -204,29 +204,54 @@ impl Limits {
             "above 0 and at most the peak force (N), or 0 with it",
         )?;
         let ranges = [
-            ("peak_torque", Some(self.peak_torque), 100.0),
-            ("position_resolution", Some(self.position_resolution), 0.01),
-            ("force_resolution", Some(self.force_resolution), 10.0),
-            ("rotation_resolution", Some(self.rotation_resolution), 0.1),
-            ("max_stiffness", self.max_stiffness, 1e6),
+            (
+                "peak_torque",
+                Some(self.peak_torque),
+                100.0,
+                "from 0 to 100 N m",
+            ),
+            (
+                "position_resolution",
+                Some(self.position_resolution),
+                0.01,
+                "from 0 to 0.01 m",
+            ),
+            (
+                "force_resolution",
+                Some(self.force_resolution),
+                10.0,
+                "from 0 to 10 N",
+            ),
+            (
+                "rotation_resolution",
+                Some(self.rotation_resolution),
+                0.1,
+                "from 0 to 0.1 rad",
+            ),
+            (
+                "max_stiffness",
+                self.max_stiffness,
+                1e6,
+                "from 0 to 1e6 N/m",
+            ),
             (
                 "max_rotational_stiffness",
                 self.max_rotational_stiffness,
                 1e5,
+                "from 0 to 1e5 N m/rad",
             ),
-            ("max_damping", self.max_damping, 1e4),
-            ("damping", self.damping, 1e4),
-            ("coulomb_friction", self.coulomb_friction, 100.0),
+            ("max_damping", self.max_damping, 1e4, "from 0 to 1e4 N s/m"),
+            ("damping", self.damping, 1e4, "from 0 to 1e4 N s/m"),
+            (
+                "coulomb_friction",
+                self.coulomb_friction,
+                100.0,
+                "from 0 to 100 N",
+            ),
         ];
-        for (name, value, most) in ranges {
+        for (name, value, most, allowed) in ranges {
             let value = value.unwrap_or(0.0);
-            let is_allowed = (0.0..=most).contains(&value);
-            check_setting(
-                name,
-                value,
-                is_allowed,
-                "from 0 to what a device can have (SI)",
-            )?;
+            check_setting(name, value, (0.0..=most).contains(&value), allowed)?;
         }
         Ok(())
     }

@@ -68,6 +68,37 @@
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! A live session on whatever device is named, with every guard on:
+//!
+//! ```
+//! use device::{Answer, AsFastAsPossible, ChosenCoupling, CouplingWish, Servo, ServoSettings, Wrench};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let period_s = 1e-3;
+//! let mut opened = device::driver::open("simulated:touch")?;
+//! let limits = *opened.device.limits();
+//! let chosen = ChosenCoupling::for_device(&limits, period_s, &CouplingWish::default())?;
+//! println!("coupling: {}", chosen.reason);
+//!
+//! // On hardware: `Realtime::ask()` on this thread, printed, and `RealTime::with_spin` as the clock.
+//! let clock = AsFastAsPossible::new(period_s)?;
+//! let mut servo = Servo::new(clock, ServoSettings::live(&limits)?)?;
+//! let mut told = None;
+//! for _ in 0..500 {
+//!     let record = servo.step(&mut *opened.device, |_handle| Answer {
+//!         command: Wrench::ZERO.into(), // of the newest result, with its stiffness
+//!         age_s: 0.0,                   // how old that result is
+//!     })?;
+//!     if told.replace(record.arming) != Some(record.arming) {
+//!         println!("{}", record.arming);
+//!     }
+//! }
+//! servo.release(&mut *opened.device);
+//! assert_eq!(servo.report().safety.trips(), 0);
+//! # Ok(())
+//! # }
+//! ```
 #![cfg_attr(
     test,
     allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")

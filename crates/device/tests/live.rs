@@ -7,9 +7,10 @@
 
 use device::driver::simulated::{MODELS, Model};
 use device::{
-    Answer, Arming, AsFastAsPossible, Command, DeviceError, Driven, HandPresence, HandSettings,
-    HandleState, HapticDevice, Insertion, Limits, PassivitySettings, PeriodRecord, Readiness,
-    Script, Servo, ServoReport, ServoSettings, Simulated, SimulatedHand, WaitsFor, Wrench,
+    Answer, Arming, AsFastAsPossible, ChosenCoupling, Command, CouplingWish, DeviceError, Driven,
+    HandPresence, HandSettings, HandleState, HapticDevice, Insertion, Limits, PassivitySettings,
+    PeriodRecord, Readiness, Script, Servo, ServoReport, ServoSettings, Simulated, SimulatedHand,
+    WaitsFor, Wrench,
 };
 use glam::{DMat3, DQuat, DVec3};
 use glamx::DPose3;
@@ -155,6 +156,49 @@ fn force_beyond_what_a_model_has_is_cut_and_its_energy_stays_bounded() {
         let (report, _) = insert(model, T, 0.02, 4.0 * model.limits.peak_force);
         let s = report.safety;
         assert!(s.wrenches_clamped + s.energy_limited > 0, "{}", model.key);
+    }
+}
+
+/// A hand that trembles holds a wall of the stiffness that is chosen for the model: nothing of it fades, although
+/// encoder, sampling and delay make a little energy all the time.
+#[test]
+fn contact_that_is_held_for_long_keeps_its_force() {
+    for model in MODELS {
+        let wish = CouplingWish::default();
+        let chosen = ChosenCoupling::for_device(&model.limits, T, &wish).unwrap();
+        let (stiffness, push) = (chosen.translational, 0.5 * model.limits.continuous_force);
+        let grip = HandSettings::default();
+        let (mut guide, hand) = SimulatedHand::guided(grip, DPose3::IDENTITY, 1e-4).unwrap();
+        let mut device = Simulated::of_model(model, hand).unwrap();
+        let settings = ServoSettings::live(device.limits()).unwrap();
+        let mut servo = Servo::new(AsFastAsPossible::new(T).unwrap(), settings).unwrap();
+        let into = push / stiffness + push / grip.grip_stiffness;
+        for k in 0..15_000 {
+            let t = f64::from(k) * T;
+            let pressed = (t - 1.0).clamp(0.0, 1.0) * into;
+            let z = -pressed + 2e-4 * (50.0 * t).sin();
+            guide
+                .set_target(DPose3::from_translation(DVec3::Z * z))
+                .unwrap();
+            let mut wanted = 0.0;
+            let record = servo
+                .step(&mut device, |handle| {
+                    wanted = stiffness * (-handle.pose.translation.z).max(0.0);
+                    Wrench::new(DVec3::Z * wanted, DVec3::ZERO)
+                })
+                .unwrap();
+            if t > 3.0 {
+                let felt = record.wrench_on_handle.force.z;
+                assert!(
+                    felt > 0.8 * wanted,
+                    "{} at {t}: {felt} of {wanted}",
+                    model.key
+                );
+            }
+        }
+        let report = servo.report();
+        assert_eq!(report.safety.energy_limited, 0, "{}", model.key);
+        assert_eq!(report.arming, Arming::Armed, "{}", model.key);
     }
 }
 

@@ -31,6 +31,9 @@ pub struct PassivitySettings {
 /// Wrenches that are remembered while they are on their way.
 const SENT: usize = 32;
 
+/// Time that devices take to make a velocity of encoder steps, s: a step alone looks like a step in this time.
+const STEP_S: f64 = 5e-3;
+
 /// One of the two ports: N, m, J or N m, rad, J.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PortSettings {
@@ -51,7 +54,7 @@ impl PassivitySettings {
     ///
     /// Allowance: the peak force over 2 mm (peak torque over 0.04 rad), a period's way at 2 m/s and 1 kHz. Store: over
     /// 5 mm (0.1 rad). Damping: the device's largest where it is stated; else what takes the peak force at 2 m/s, at
-    /// most 5 N s/m, and of the torque at 40 rad/s.
+    /// most 5 N s/m, and of the torque at 40 rad/s. Least speed: 2 mm/s (0.02 rad/s), or an encoder's step in 5 ms.
     #[must_use]
     pub fn for_limits(limits: &Limits) -> Self {
         let (force, torque) = (limits.peak_force, limits.peak_torque);
@@ -59,14 +62,14 @@ impl PassivitySettings {
             translation: PortSettings {
                 effort_max: force,
                 damping_max: limits.max_damping.unwrap_or((force / 2.0).min(5.0)),
-                speed_min: 2e-3,
+                speed_min: (limits.position_resolution / STEP_S).max(2e-3),
                 allowance: 2e-3 * force,
                 store: 5e-3 * force,
             },
             rotation: PortSettings {
                 effort_max: torque,
                 damping_max: torque / 40.0,
-                speed_min: 0.02,
+                speed_min: (limits.rotation_resolution / STEP_S).max(0.02),
                 allowance: 0.04 * torque,
                 store: 0.1 * torque,
             },

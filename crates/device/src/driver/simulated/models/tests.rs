@@ -6,8 +6,9 @@ use glamx::DPose3;
 use super::*;
 use crate::driver::simulated::{Simulated, Simulations};
 use crate::driver::{self, Family};
+use crate::error::DeviceError;
 use crate::hand::{HandSettings, SimulatedHand};
-use crate::haptic_device::{HandPresence, HapticDevice};
+use crate::haptic_device::{Command, HandPresence, HandleState, HapticDevice, Limits};
 use crate::script::{Insertion, Script};
 use crate::wrench::Wrench;
 
@@ -170,4 +171,36 @@ fn delay_in_periods_is_rounded_up() {
     assert_eq!(omega.plant(1e-3).delay_periods, 1);
     assert_eq!(omega.plant(2.5e-4).delay_periods, 1);
     assert_eq!(omega.plant(1e-4).delay_periods, 3);
+}
+
+#[test]
+fn device_with_absurd_limits_is_not_opened() {
+    let opened = || Simulations.open("touch").unwrap();
+    assert!(driver::checked(opened()).is_ok());
+    struct Absurd(Limits);
+    impl HapticDevice for Absurd {
+        fn name(&self) -> &str {
+            "absurd"
+        }
+        fn limits(&self) -> &Limits {
+            &self.0
+        }
+        fn read(&mut self, _: f64) -> Result<HandleState, DeviceError> {
+            Ok(HandleState::at_rest(DPose3::IDENTITY))
+        }
+        fn write(&mut self, _: &Command) -> Result<(), DeviceError> {
+            Ok(())
+        }
+        fn stop(&mut self) {}
+    }
+    let mut limits = Limits::virtuose_6d();
+    limits.peak_force = f64::NAN;
+    let absurd = driver::Opened {
+        device: Box::new(Absurd(limits)),
+        ..opened()
+    };
+    assert_eq!(
+        driver::checked(absurd).unwrap_err().to_string(),
+        "absurd reports limits that no device has: peak_force is NaN; it must be from 0 to 1000 N"
+    );
 }

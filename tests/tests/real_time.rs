@@ -258,6 +258,7 @@ fn no_period_of_a_live_session_allocates() {
         let spec = LiveSpec {
             mapping: Some(Mapping::new(MappingSettings::default(), held.start()).unwrap()),
             clutch: 0,
+            stretch_max: None,
             n_periods: Some(n_periods),
             lever: 0.05,
             servo: ServoSettings::for_limits(&limits),
@@ -268,6 +269,7 @@ fn no_period_of_a_live_session_allocates() {
         let (log, samples) = Log::create(&path, &BTreeMap::new()).unwrap();
         let (viewer, mut view) = snapshots(engine.settings().max_contacts);
         let ports = LivePorts {
+            at_start: None,
             viewer,
             log: Some(samples),
         };

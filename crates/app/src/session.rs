@@ -132,6 +132,7 @@ pub fn run(
             drive: Drive::Scripted { script, n_periods },
             ports: Ports::recording(&mut recording),
         },
+        at_start: None,
         progress,
     };
     if spec.real_time {
@@ -143,6 +144,7 @@ pub fn run(
             None => session.one_rate(&mut servo, engine, None).map(|()| None),
             Some(_) => session.two_rates_beside(&mut servo, engine, fast).map(Some),
         })?;
+        drop(session);
         recording.servo = servo.report();
         recording.two_rates = two;
         seen.note(&mut recording);
@@ -156,6 +158,7 @@ pub fn run(
                 .stepped(&mut servo, every, engine, shape, fast)
                 .map(Some),
         }?;
+        drop(session);
         recording.servo = servo.report();
         recording.two_rates = two;
     }
@@ -167,6 +170,8 @@ pub fn run(
 struct Session<'a> {
     device: &'a mut dyn HapticDevice,
     course: Course<'a>,
+    /// On the loop's thread, just before the first period.
+    at_start: Option<Box<dyn FnOnce() + Send + 'a>>,
     progress: &'a dyn fem::Progress,
 }
 
@@ -184,6 +189,19 @@ struct Mapped {
     mapping: Mapping,
     /// Buttons of which each holds the clutch.
     clutch: u32,
+    /// m, how far the handle may be ahead of a tool that is held up; `None` where the hand feels it.
+    stretch_max: Option<f64>,
+}
+
+impl Mapped {
+    /// Takes a handle that nothing holds back to where the tool leaves it. `body`: the held body's grip, world.
+    fn hold_back(&mut self, handle: &DPose3, body: &DPose3) {
+        let ahead = handle.translation - body.translation;
+        let stretch = ahead.length();
+        if let Some(most) = self.stretch_max.filter(|most| stretch > *most) {
+            self.mapping.slip(ahead * (most / stretch - 1.0));
+        }
+    }
 }
 
 impl Course<'_> {
@@ -209,7 +227,12 @@ impl Course<'_> {
     }
 
     /// Tells the ports of a step, and gives the command for the device. `handle`: in the world.
-    fn tell(&mut self, handle: &HandleState, answer: Answer, contacts: &[ActiveContact]) -> Wrench {
+    fn tell(
+        &mut self,
+        handle: &HandleState,
+        answer: Answer,
+        contacts: &[ActiveContact],
+    ) -> Command {
         let report = answer.report;
         let gone = self.held.gone(&report.tool_pose, self.ports.direction);
         let solved = Solved {
@@ -224,11 +247,14 @@ impl Course<'_> {
         };
         self.ports.solved(&self.held, &solved);
         let on_handle = Command::from(answer.wrench_on_handle);
-        match &self.mapped {
+        match &mut self.mapped {
             None => on_handle,
-            Some(mapped) => mapped.mapping.to_device(&on_handle),
+            Some(mapped) => {
+                let body = self.held.pose(&report.tool_pose);
+                mapped.hold_back(&handle.pose, &body);
+                mapped.mapping.to_device(&on_handle)
+            }
         }
-        .wrench
     }
 }
 
@@ -272,6 +298,7 @@ impl Session<'_> {
         engine: &mut Engine,
         mut shape: Option<&mut Shape>,
     ) -> Result<(), Error> {
+        self.begin();
         let mut period = 0;
         while self.course.drive.goes_on(period)? {
             let course = &mut self.course;
@@ -358,6 +385,12 @@ impl Session<'_> {
             period += 1;
         }
         Ok(())
+    }
+
+    fn begin(&mut self) {
+        if let Some(at_start) = self.at_start.take() {
+            at_start();
+        }
     }
 
     /// What the display would do between two steps, and its time, ns.

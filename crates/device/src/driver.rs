@@ -42,6 +42,11 @@ pub trait Family: Sync {
     /// What is attached, and what could be and why not. May take a second, never longer. At least one entry.
     fn list(&self) -> Vec<Listing>;
 
+    /// Whether a deflection is a velocity: the handle's pose is integrated, and nothing holds it back at a wall.
+    fn is_rate(&self) -> bool {
+        false
+    }
+
     /// Opens a device by its place, what stands after the colon; "" is the first there is.
     ///
     /// # Errors
@@ -175,6 +180,13 @@ pub fn list() -> Vec<Listing> {
             })
             .collect()
     })
+}
+
+/// Whether a device of this name is one whose deflection is a velocity ([`Family::is_rate`]).
+#[must_use]
+pub fn is_rate(name: &str) -> bool {
+    let key = name.split(':').next();
+    (FAMILIES.iter()).any(|family| key == Some(family.key()) && family.is_rate())
 }
 
 /// Opens a device by its name.

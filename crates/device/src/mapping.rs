@@ -189,6 +189,15 @@ impl Mapping {
         self.anchor = None;
     }
 
+    /// Moves the grip in the world (m) without the handle, and stays so from the next sample on: for a device that
+    /// nothing holds back, whose grip would run ahead of a tool that is held up.
+    pub fn slip(&mut self, by: DVec3) {
+        if by.is_finite() {
+            self.anchored.translation += by;
+            self.last.pose.translation += by;
+        }
+    }
+
     /// Pose and velocities of the grip; nothing where the numbers overflow.
     fn follow(&self, anchor: &DPose3, handle: &HandleState) -> Option<(DPose3, DVec3, DVec3)> {
         let MappingSettings {

@@ -12,7 +12,7 @@ use std::thread::ScopedJoinHandle;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use device::{Mapping, MappingSettings, ServoSettings};
+use device::{Mapping, MappingSettings, Realtime, ServoSettings};
 
 use super::{CacheArgs, period_of, print};
 use crate::engine::Engine;
@@ -101,13 +101,19 @@ pub(super) fn run(args: &LiveArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u
     };
     opened.notes.iter().for_each(|note| ui.note(note));
     let limits = opened.limits(args.max_force)?;
-    let (scene, coupling) = open::coupled(scene, &limits, session.period_s);
+    let (scene, coupling) = open::coupled(scene, &limits, session.period_s)?;
     let mut engine = setup::engine(&scene, &prepared, tool)?;
     let rates = live::rates(&session, &prepared, &mut engine)?;
     ui.note(&rates.words());
     let mut shape = look_ahead_shape(&scene, &prepared, &engine, &options)?;
 
-    let spec = live_spec(args, session, &opened, &limits, &prepared)?;
+    let mut spec = live_spec(args, session, &opened, &limits, &prepared)?;
+    if opened.is_rate {
+        // Nothing holds the hand back, and what a motor shakes does no work on it.
+        let largest = live::largest_force(&spec.session, &mut engine);
+        spec.stretch_max = Some(open::stretch(largest, &scene));
+        spec.servo.safety.passivity = None;
+    }
     let about = BTreeMap::from([
         ("title".to_owned(), scene.title.clone()),
         ("scene".to_owned(), scene.path.display().to_string()),
@@ -122,14 +128,19 @@ pub(super) fn run(args: &LiveArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u
         None => (None, None),
     };
     let (viewer, view) = snapshots(engine.settings().max_contacts);
+    let (granted, granted_words) = std::sync::mpsc::channel();
     let ports = LivePorts {
+        at_start: Some(Box::new(move || {
+            // Nobody listens where the session ended at once.
+            let _ = granted.send(Realtime::ask().to_string());
+        })),
         viewer,
         log: samples,
     };
     let mut eye = Eye {
         view,
         shape: shape.as_mut(),
-        messages: &opened.messages,
+        messages: [&opened.messages, &granted_words],
         ui,
     };
     let device = &mut *opened.device;
@@ -188,6 +199,7 @@ fn live_spec(
         n_periods: seconds.map(|s| (s / session.period_s).ceil() as u64),
         mapping,
         clutch: args.clutch.map_or(0, |button| 1 << (button - 1)),
+        stretch_max: None,
         lever: part_extent(&prepared.loaded.mesh),
         servo: ServoSettings::live(limits)?,
         session,
@@ -246,7 +258,7 @@ fn together(
     rates: &ChosenRates,
     device: &mut dyn device::HapticDevice,
     engine: &mut Engine,
-    ports: LivePorts,
+    ports: LivePorts<'_>,
     log: Option<Log>,
     eye: &mut Eye<'_, '_>,
 ) -> Result<(LiveReport, Option<Logged>), Error> {
@@ -282,7 +294,7 @@ fn together(
 struct Eye<'a, 'u> {
     view: SnapshotOutput,
     shape: Option<&'a mut Shape>,
-    messages: &'a Receiver<String>,
+    messages: [&'a Receiver<String>; 2],
     ui: &'a Ui<'u>,
 }
 
@@ -292,7 +304,7 @@ impl Eye<'_, '_> {
         let begun = Instant::now();
         let mut looks = 0;
         while !haptic.is_finished() {
-            self.messages.try_iter().for_each(|m| self.ui.note(&m));
+            self.tell();
             if self.view.update() {
                 let snapshot = self.view.output_buffer();
                 if let (Some(shape), Some(sample)) = (&mut self.shape, &snapshot.sample) {
@@ -307,7 +319,12 @@ impl Eye<'_, '_> {
             looks += 1;
             std::thread::sleep(Duration::from_secs_f64(LOOK_S));
         }
-        self.messages.try_iter().for_each(|m| self.ui.note(&m));
+        self.tell();
+    }
+
+    fn tell(&self) {
+        let messages = self.messages.iter().flat_map(|m| m.try_iter());
+        messages.for_each(|message| self.ui.note(&message));
     }
 }
 

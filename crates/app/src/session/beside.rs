@@ -75,6 +75,7 @@ impl Session<'_> {
         loop_end: &mut LoopEnd,
         is_alive: impl Fn() -> bool,
     ) -> Result<(), Error> {
+        self.begin();
         let mut tick = 0;
         while self.course.drive.goes_on(tick)? {
             if !is_alive() {

@@ -16,6 +16,9 @@ use crate::prepare::PreparedPart;
 /// Hand-overs and steps of two rates that are kept: the first minutes of a session.
 const KEPT_TICKS: usize = 100_000;
 
+/// Last part of a wait that is spun through, s: at real-time priority no more, or other threads starve at 10 kHz.
+const SPIN_S: f64 = 3e-5;
+
 /// What a live session needs beyond the engine and the device.
 #[derive(Clone, Debug)]
 pub struct LiveSpec {
@@ -25,6 +28,8 @@ pub struct LiveSpec {
     pub mapping: Option<Mapping>,
     /// Buttons of which each holds the clutch.
     pub clutch: u32,
+    /// m, how far the handle may be ahead of a tool that is held up; `None` where the hand feels it.
+    pub stretch_max: Option<f64>,
     /// Periods at most.
     pub n_periods: Option<u64>,
     /// m, divides torques to compare them with forces.
@@ -34,8 +39,9 @@ pub struct LiveSpec {
 }
 
 /// Who listens.
-#[derive(Debug)]
-pub struct LivePorts {
+pub struct LivePorts<'a> {
+    /// Called on the loop's thread, just before the first period.
+    pub at_start: Option<Box<dyn FnOnce() + Send + 'a>>,
     /// The newest period.
     pub viewer: SnapshotInput,
     /// Every period.
@@ -69,6 +75,20 @@ pub fn rates(
     Ok(choose(spec, engine))
 }
 
+/// N, largest force of the contact on the scene's way, gone in a few hundred steps.
+pub fn largest_force(spec: &SessionSpec, engine: &mut Engine) -> f64 {
+    const N_STEPS: u32 = 300;
+    engine.reset();
+    let mut largest = 0.0_f64;
+    for k in 0..=N_STEPS {
+        let shift = spec.travel * f64::from(k) / f64::from(N_STEPS) * spec.direction.normalize();
+        let report = engine.step(&spec.held.target(&spec.held.along(shift)));
+        largest = largest.max(report.contact_force_on_tool().length());
+    }
+    engine.reset();
+    largest
+}
+
 /// Runs until `stop`, Ctrl-C or the last period, on this thread; the device is released at the end.
 ///
 /// Nothing grows while it goes on. A device that is lost gets no force and is waited for.
@@ -80,10 +100,10 @@ pub fn run(
     rates: &ChosenRates,
     device: &mut dyn HapticDevice,
     engine: &mut Engine,
-    ports: LivePorts,
+    ports: LivePorts<'_>,
     stop: &AtomicBool,
 ) -> Result<LiveReport, Error> {
-    let clock = RealTime::new(spec.session.period_s)?;
+    let clock = RealTime::with_spin(spec.session.period_s, SPIN_S)?;
     run_on(clock, spec, rates, device, engine, ports, stop)
 }
 
@@ -97,7 +117,7 @@ pub fn run_on<C: Clock>(
     rates: &ChosenRates,
     device: &mut dyn HapticDevice,
     engine: &mut Engine,
-    ports: LivePorts,
+    ports: LivePorts<'_>,
     stop: &AtomicBool,
 ) -> Result<LiveReport, Error> {
     let fast = FastSettings {
@@ -114,6 +134,7 @@ pub fn run_on<C: Clock>(
             mapped: spec.mapping.clone().map(|mapping| Mapped {
                 mapping,
                 clutch: spec.clutch,
+                stretch_max: spec.stretch_max,
             }),
             drive: Drive::Live {
                 stop,
@@ -127,6 +148,7 @@ pub fn run_on<C: Clock>(
                 ..Ports::default()
             },
         },
+        at_start: ports.at_start,
         progress: &fem::Silent,
     };
     let two_rates = match rates.every {

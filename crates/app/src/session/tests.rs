@@ -100,6 +100,7 @@ fn run_with(
             },
             ports: Ports::recording(&mut recording),
         },
+        at_start: None,
         progress,
     };
     let mut first = slow::empty(engine);
@@ -119,6 +120,7 @@ fn run_with(
     };
     let fast = FastLoop::new(first, fast).unwrap();
     let log = session.beside(&mut servo, fast, boxes, solve);
+    drop(session);
     recording.servo = servo.report();
     recording.device = device.events();
     (log, recording)

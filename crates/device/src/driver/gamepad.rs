@@ -42,6 +42,10 @@ impl Family for Gamepad {
         KEY
     }
 
+    fn is_rate(&self) -> bool {
+        true
+    }
+
     fn title(&self) -> &'static str {
         "gamepad (input, force as rumble)"
     }

@@ -22,6 +22,9 @@ const FAILURES_MAX: u32 = 100;
 /// Time between two tries to open a lost link, s.
 const RETRY_S: f64 = 1.0;
 
+/// Time between two messages about failures, s.
+const RETELL_S: f64 = 10.0;
+
 /// Longest wait for the link's thread at the end, s: a library that hangs must not hold the program.
 const JOIN_S: f64 = 1.0;
 
@@ -246,6 +249,7 @@ impl<F: FnMut() -> Result<Connected, Unavailable>> Worker<F> {
     fn serve(&mut self, name: &str, link: &mut dyn Link) -> Option<DeviceError> {
         let fade = Watchdog::for_link();
         let mut failures = 0;
+        let mut told: Option<Instant> = None;
         while !self.quit.load(Ordering::Acquire) {
             let wanted = *self.wanted.read();
             let age_s = wanted.at.elapsed().as_secs_f64();
@@ -273,8 +277,10 @@ impl<F: FnMut() -> Result<Connected, Unavailable>> Worker<F> {
                     if failures >= FAILURES_MAX || matches!(error, DeviceError::Gone { .. }) {
                         return Some(error);
                     }
-                    if failures == 1 {
+                    // A link that fails every other time must not fill the memory with its messages.
+                    if told.is_none_or(|at| at.elapsed().as_secs_f64() > RETELL_S) {
                         self.say(format!("{name}: {error}"));
+                        told = Some(Instant::now());
                     }
                     std::thread::sleep(Duration::from_millis(1));
                 }
@@ -293,7 +299,8 @@ impl<F: FnMut() -> Result<Connected, Unavailable>> Worker<F> {
                 }
                 std::thread::sleep(Duration::from_millis(10));
             }
-            if let Ok((_, link)) = (self.connect)() {
+            if let Ok((identity, link)) = (self.connect)() {
+                identity.notes.into_iter().for_each(|note| self.say(note));
                 return Some(link);
             }
         }

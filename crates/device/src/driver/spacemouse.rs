@@ -34,6 +34,10 @@ impl Family for SpaceMouse {
         KEY
     }
 
+    fn is_rate(&self) -> bool {
+        true
+    }
+
     fn title(&self) -> &'static str {
         "SpaceMouse (input only)"
     }

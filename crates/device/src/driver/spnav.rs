@@ -25,6 +25,10 @@ impl Family for Spnav {
         KEY
     }
 
+    fn is_rate(&self) -> bool {
+        true
+    }
+
     fn title(&self) -> &'static str {
         "SpaceMouse through spacenavd (input only)"
     }

@@ -349,3 +349,18 @@ fn settings_that_make_no_sense_are_refused_by_name() {
         assert!(refused.to_string().starts_with("start is"), "{refused}");
     }
 }
+
+#[test]
+fn a_grip_that_slips_stays_where_it_was_put_and_follows_from_there() {
+    let mut mapping = Mapping::new(MappingSettings::default(), DPose3::IDENTITY).unwrap();
+    let at = |x: f64| DPose3::from_translation(DVec3::new(x, 0.0, 0.0));
+    mapping.to_world(&handle(at(0.0), 0.0), false);
+    let ahead = mapping.to_world(&handle(at(0.03), 0.1), false);
+    assert_near(&ahead.pose, &at(0.03), 1e-15);
+    mapping.slip(DVec3::new(-0.01, 0.0, 0.0));
+    let held = mapping.to_world(&handle(at(0.03), 0.2), false);
+    assert_near(&held.pose, &at(0.02), 1e-15);
+    mapping.slip(DVec3::new(f64::NAN, 0.0, 0.0));
+    let on = mapping.to_world(&handle(at(0.04), 0.3), false);
+    assert_near(&on.pose, &at(0.03), 1e-15);
+}

@@ -19,7 +19,10 @@ impl NormClamp {
             limit_length(wanted.force, self.force_max),
             limit_length(wanted.torque, self.torque_max),
         );
-        events.wrenches_clamped += u64::from(clamped != *wanted);
+        // A device that renders no force or no torque at all is not limited in it.
+        let is_shorter = (self.force_max > 0.0 && clamped.force != wanted.force)
+            || (self.torque_max > 0.0 && clamped.torque != wanted.torque);
+        events.wrenches_clamped += u64::from(is_shorter);
         clamped
     }
 }

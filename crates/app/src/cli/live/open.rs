@@ -5,10 +5,13 @@ use std::sync::mpsc::{Receiver, channel};
 
 use device::driver::simulated::Model;
 use device::driver::{self, Unavailable};
-use device::{HapticDevice, Insertion, Limits, Script, Simulated, SimulatedHand};
+use device::{
+    ChosenCoupling, CouplingWish, HapticDevice, Insertion, Limits, Script, Simulated, SimulatedHand,
+};
 use glam::{DMat3, DQuat, DVec3};
 
 use crate::Error;
+use crate::report::plot::short;
 use crate::scene::{DeviceModel, Scene};
 use crate::session::SessionSpec;
 
@@ -22,6 +25,8 @@ pub(super) struct Hand {
     pub(super) messages: Receiver<String>,
     /// Whether its frame is the scene's world.
     pub(super) is_in_world: bool,
+    /// Whether nothing holds its handle back.
+    pub(super) is_rate: bool,
     /// s, of a scripted hand.
     pub(super) ends_after_s: Option<f64>,
 }
@@ -63,6 +68,7 @@ pub(super) fn external(name: &str) -> Result<Option<Hand>, Error> {
         notes: opened.notes,
         messages: opened.messages,
         is_in_world: false,
+        is_rate: driver::is_rate(name),
         ends_after_s: None,
     }))
 }
@@ -101,19 +107,58 @@ pub(super) fn simulated(
         notes: Vec::new(),
         messages,
         is_in_world: true,
+        is_rate: false,
         ends_after_s: Some(ends_after_s),
         device: Box::new(device),
     })
 }
 
 /// The scene with the coupling that the device allows where the scene states none; with what to tell of it.
-pub(super) fn coupled(scene: Scene, limits: &Limits, period_s: f64) -> (Scene, String) {
-    let _ = (limits, period_s);
+///
+/// # Errors
+/// Limits that no device has.
+pub(super) fn coupled(
+    mut scene: Scene,
+    limits: &Limits,
+    period_s: f64,
+) -> Result<(Scene, String), Error> {
+    let coupling = &mut scene.coupling;
+    let wish = CouplingWish {
+        translational: coupling.translational_stiffness,
+        rotational: coupling.rotational_stiffness,
+        ..CouplingWish::default()
+    };
+    let allowed = ChosenCoupling::for_device(limits, period_s, &wish)?;
+    if !coupling.is_translational_given {
+        coupling.translational_stiffness = allowed.translational;
+    }
+    if !coupling.is_rotational_given {
+        coupling.rotational_stiffness = allowed.rotational;
+    }
+    let why = if coupling.translational_stiffness > allowed.translational {
+        format!(
+            "the scene's; this device alone bears {} N/m: {}; leave it out of the scene where the device shakes",
+            short(allowed.translational),
+            allowed.reason
+        )
+    } else if coupling.is_translational_given {
+        "the scene's".to_owned()
+    } else {
+        allowed.reason
+    };
     let text = format!(
-        "{:.0} N/m, {:.1} N m/rad",
-        scene.coupling.translational_stiffness, scene.coupling.rotational_stiffness
+        "{} N/m, {} N m/rad ({why})",
+        short(coupling.translational_stiffness),
+        short(coupling.rotational_stiffness)
     );
-    (scene, text)
+    Ok((scene, text))
+}
+
+/// m, how far a handle that nothing holds back may be ahead: enough for one and a half times the largest force (N) of the
+/// way, so that every peak can be passed, and half a millimetre for parts that hardly resist.
+pub(super) fn stretch(largest_force: f64, scene: &Scene) -> f64 {
+    const LEAST: f64 = 5e-4;
+    LEAST + 1.5 * largest_force / scene.coupling.translational_stiffness
 }
 
 /// A right-handed permutation of axes with signs.

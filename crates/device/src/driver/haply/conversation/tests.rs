@@ -356,6 +356,21 @@ fn force_that_is_not_taken_is_given_in_the_other_form_after_a_new_arming() {
 }
 
 #[test]
+fn form_that_has_worked_is_not_changed_later() {
+    let mut talk = Talk::new();
+    talk.push_for(500);
+    talk.messages();
+    talk.renders = 0.0;
+    talk.push_for(2000);
+    assert_eq!(talk.talk.form, Form::Vector);
+    let told = talk.messages();
+    assert_eq!(
+        told,
+        ["the service renders nothing of the force that is sent"]
+    );
+}
+
+#[test]
 fn late_answer_takes_the_force_away_until_it_is_armed_anew() {
     let mut talk = Talk::new();
     assert_eq!(talk.push_for(2).0, UP);

@@ -1,5 +1,6 @@
 //! A stand-in for the Inverse Service: answers each frame with one state and looks at what it is sent.
 
+use std::collections::VecDeque;
 use std::net::{TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -39,6 +40,8 @@ pub(super) struct Manner {
     pub(super) settings: Settings,
     /// It hears and does not answer.
     pub(super) is_mute: bool,
+    /// Its events have ended.
+    pub(super) is_without_events: bool,
     /// It has been killed.
     pub(super) is_down: bool,
     /// Waits before it answers.
@@ -61,6 +64,7 @@ impl Default for Manner {
             gate: 0.3,
             settings: Settings::Taken,
             is_mute: false,
+            is_without_events: false,
             is_down: false,
             pause: Duration::ZERO,
             unasked: 0,
@@ -73,8 +77,10 @@ impl Default for Manner {
 #[derive(Default)]
 pub(super) struct Seen {
     pub(super) frames: Vec<Value>,
-    /// Frames that came before the one before was answered.
+    /// Frames with a force that came before the one before was answered.
     pub(super) early: usize,
+    /// Forces that were heard and not answered.
+    pub(super) unanswered: usize,
     pub(super) connections: usize,
     /// Connections that said goodbye.
     pub(super) goodbyes: usize,
@@ -241,10 +247,14 @@ fn converse(web: &mut WebSocket<TcpStream>, shared: &Shared) {
             return;
         };
     }
+    let mut early = VecDeque::new();
     while !shared.has_ended() {
-        match web.read() {
+        let next = early
+            .pop_front()
+            .map_or_else(|| web.read(), |text| Ok(Message::text::<String>(text)));
+        match next {
             Ok(Message::Text(text)) => {
-                let Ok(()) = answer(web, &text, shared) else {
+                let Ok(()) = answer(web, &text, &mut early, shared) else {
                     return;
                 };
             }
@@ -260,7 +270,12 @@ fn converse(web: &mut WebSocket<TcpStream>, shared: &Shared) {
 }
 
 /// Takes a frame and gives its one answer.
-fn answer(web: &mut WebSocket<TcpStream>, text: &str, shared: &Shared) -> tungstenite::Result<()> {
+fn answer(
+    web: &mut WebSocket<TcpStream>,
+    text: &str,
+    early: &mut VecDeque<String>,
+    shared: &Shared,
+) -> tungstenite::Result<()> {
     let manner = shared.manner();
     let frame: Value = serde_json::from_str(text).unwrap();
     let (number, mut state) = {
@@ -293,6 +308,8 @@ fn answer(web: &mut WebSocket<TcpStream>, text: &str, shared: &Shared) -> tungst
         (seen.frames.len() - 1, state.to_string())
     };
     if manner.is_mute {
+        let is_force = !text.contains("session");
+        locked(&shared.seen).unanswered += usize::from(is_force);
         return Ok(());
     }
     if !manner.script.is_empty() {
@@ -300,7 +317,7 @@ fn answer(web: &mut WebSocket<TcpStream>, text: &str, shared: &Shared) -> tungst
     }
     if !manner.pause.is_zero() {
         std::thread::sleep(manner.pause);
-        note_early(web, shared);
+        note_early(web, early, shared);
     }
     web.send(Message::text(state.clone()))?;
     for _ in 0..manner.unasked {
@@ -309,11 +326,14 @@ fn answer(web: &mut WebSocket<TcpStream>, text: &str, shared: &Shared) -> tungst
     Ok(())
 }
 
-/// Is there a frame already, before the last one was answered?
-fn note_early(web: &mut WebSocket<TcpStream>, shared: &Shared) {
+/// Is there a frame already, before the last one was answered? A zero may be, after an answer that is late.
+fn note_early(web: &mut WebSocket<TcpStream>, early: &mut VecDeque<String>, shared: &Shared) {
     web.get_ref().set_nonblocking(true).unwrap();
-    while let Ok(Message::Text(_)) = web.read() {
-        locked(&shared.seen).early += 1;
+    while let Ok(Message::Text(text)) = web.read() {
+        let frame: Value = serde_json::from_str(&text).unwrap();
+        let pushes = force_of(&frame, "vector").is_some_and(|force| force != DVec3::ZERO);
+        locked(&shared.seen).early += usize::from(pushes);
+        early.push_back(text.as_str().to_owned());
     }
     web.get_ref().set_nonblocking(false).unwrap();
 }
@@ -323,7 +343,7 @@ fn serve_events(stream: TcpStream, shared: &Shared) {
         return;
     };
     shared.events_heard.store(true, Ordering::Release);
-    while !shared.has_ended() {
+    while !shared.has_ended() && !shared.manner().is_without_events {
         for event in std::mem::take(&mut *locked(&shared.events)) {
             if web.send(Message::text(event)).is_err() {
                 return;
@@ -339,11 +359,14 @@ fn force_of(frame: &Value, member: &str) -> Option<DVec3> {
     Some(DVec3::new(x?, y?, z?))
 }
 
-/// Waits until it holds, for ten seconds at most.
+/// How long is waited for what must come. A loaded machine takes its time.
+pub(super) const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Waits until it holds, within patience.
 pub(super) fn wait_until(mut holds: impl FnMut() -> bool) {
     let begun = Instant::now();
     while !holds() {
-        assert!(begun.elapsed().as_secs() < 10, "it never came to be");
+        assert!(begun.elapsed() < PATIENCE, "it never came to be");
         std::thread::sleep(Duration::from_millis(1));
     }
 }

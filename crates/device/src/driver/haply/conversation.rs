@@ -18,8 +18,11 @@ use crate::wrench::limit_length;
 /// Time for which a device that was not ready stays so, s: long enough for the loop to see it and to arm anew.
 const NOT_READY_HOLD: Duration = Duration::from_millis(100);
 
-/// Age of the last good state from which on no force is sent.
+/// Time without an answer after which a zero follows the force in flight.
 pub(super) const STALL: Duration = Duration::from_millis(20);
+
+/// Age of the last good state from which on no force is sent; the loop, too, takes the device for silent then.
+const SILENT: Duration = Duration::from_millis(50);
 
 /// Answers without a state of the device, in a row, after which the connection is given up.
 const USELESS_MAX: u32 = 200;
@@ -75,9 +78,14 @@ impl Conversation {
     /// The frame for a command. The force is zero unless the device is ready and has told of itself just now.
     pub(super) fn say(&mut self, command: &Command, now: Instant) -> String {
         let wanted = command.wrench.force;
-        let is_heard = self
+        let is_silent = self
             .good_at
-            .is_some_and(|at| now.saturating_duration_since(at) < STALL);
+            .is_some_and(|at| now.saturating_duration_since(at) >= SILENT);
+        if is_silent {
+            let why = "the service told nothing of the device for a while";
+            self.alarms.hold(Readiness::Tripped(why), now);
+        }
+        let is_heard = self.good_at.is_some() && !is_silent;
         let may_push = is_heard && wanted.is_finite() && self.readiness(now) == Readiness::Ready;
         self.sent = if may_push {
             limit_length(wanted, self.force_max)

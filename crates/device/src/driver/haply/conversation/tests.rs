@@ -403,7 +403,7 @@ fn device_that_tells_nothing_gets_no_force_and_at_last_the_link_ends() {
             talk.now += MS;
             n += 1;
             let said = talk.talk.say(&command, talk.now);
-            if n > 25 {
+            if n > 51 {
                 assert!(said.contains(r#""z":0.0"#), "{said}");
             }
             match talk.talk.hear(&text, talk.now) {
@@ -415,6 +415,21 @@ fn device_that_tells_nothing_gets_no_force_and_at_last_the_link_ends() {
         assert!(gone.to_string().contains(ID));
         assert_eq!(talk.messages().len(), 1);
     }
+}
+
+#[test]
+fn device_that_was_not_told_of_for_a_while_must_be_armed_anew() {
+    let mut talk = Talk::new();
+    assert_eq!(talk.push_for(2).0, UP);
+    let position = talk.answer["inverse3"][0]["state"]["cursor_position"].take();
+    for _ in 0..60 {
+        assert_eq!(talk.exchange(UP).1, None);
+    }
+    talk.answer["inverse3"][0]["state"]["cursor_position"] = position;
+    let (sent, state) = talk.push_for(1);
+    assert_eq!(sent, DVec3::ZERO);
+    assert!(matches!(state.readiness, Readiness::Tripped(_)));
+    assert_eq!(talk.push_for(1200).0, UP);
 }
 
 #[test]

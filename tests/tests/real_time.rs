@@ -21,7 +21,7 @@ use snapin::prepare::PreparedPart;
 use snapin::report::mcap_file;
 use snapin::scene::{Adaptive, Columns, ContactAt, FreeNodes, Multiply, Scalar, Scene};
 use snapin::session::fast::FastSettings;
-use snapin::session::live::{self, LivePorts, LiveSpec};
+use snapin::session::live::{self, Hands, LivePorts, LiveSpec};
 use snapin::session::log::Log;
 use snapin::session::rates::Rates;
 use snapin::session::slow::Stepped;

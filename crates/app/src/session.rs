@@ -11,12 +11,14 @@
 //! all the same.
 
 mod beside;
+mod course;
 mod drive;
 pub mod fast;
 pub mod handover;
 mod held;
 pub mod live;
 pub mod log;
+mod other;
 mod overlap;
 mod ports;
 pub mod rates;
@@ -30,22 +32,22 @@ use std::time::Instant;
 
 use device::driver::simulated::Model;
 use device::{
-    AsFastAsPossible, Clock, Command, HandSettings, HandleState, HapticDevice, Insertion, Mapping,
-    RealTime, Script, Servo, ServoSettings, Simulated, SimulatedHand, SimulatedSettings, Wrench,
+    AsFastAsPossible, Clock, HandSettings, HapticDevice, Insertion, RealTime, Script, Servo,
+    ServoSettings, Simulated, SimulatedHand, SimulatedSettings,
 };
 use fem::Mesh;
 use glam::DVec3;
-use glamx::DPose3;
 
 use crate::Error;
-use crate::engine::{ActiveContact, Engine, Stage, StepReport};
+use crate::engine::{Engine, StepReport};
 use crate::prepare::PreparedPart;
 use crate::shape::{self, Shape};
+use course::{Answer, Course};
 use drive::Drive;
-use fast::{FastSettings, Tick};
+use fast::FastSettings;
 pub use held::{Gone, Held, Holds};
 pub use overlap::{Clearance, refuse_overlap};
-use ports::{Ports, Solved};
+use ports::Ports;
 pub use ports::{Sample, Snapshot, SnapshotInput, SnapshotOutput, snapshots};
 use rates::{Rates, TwoRates, choose};
 pub(crate) use recording::Entry;
@@ -129,6 +131,7 @@ pub fn run(
         course: Course {
             held: spec.held,
             mapped: None,
+            other: None,
             drive: Drive::Scripted { script, n_periods },
             ports: Ports::recording(&mut recording),
         },
@@ -173,110 +176,6 @@ struct Session<'a> {
     /// On the loop's thread, just before the first period.
     at_start: Option<Box<dyn FnOnce() + Send + 'a>>,
     progress: &'a dyn fem::Progress,
-}
-
-/// What is moved, by whom, and who is told.
-struct Course<'a> {
-    held: Held,
-    /// How the device stands in the world; `None`: its frame is the world.
-    mapped: Option<Mapped>,
-    drive: Drive<'a>,
-    ports: Ports<'a>,
-}
-
-/// A device whose frame is not the world.
-struct Mapped {
-    mapping: Mapping,
-    /// Buttons of which each holds the clutch.
-    clutch: u32,
-    /// m, how far the handle may be ahead of a tool that is held up; `None` where the hand feels it.
-    stretch_max: Option<f64>,
-}
-
-impl Mapped {
-    /// Takes a handle that nothing holds back to where the tool leaves it. `body`: the held body's grip, world.
-    fn hold_back(&mut self, handle: &DPose3, body: &DPose3) {
-        let ahead = handle.translation - body.translation;
-        let stretch = ahead.length();
-        if let Some(most) = self.stretch_max.filter(|most| stretch > *most) {
-            self.mapping.slip(ahead * (most / stretch - 1.0));
-        }
-    }
-}
-
-impl Course<'_> {
-    /// A handle in the world. Once a period.
-    fn in_world(&mut self, handle: &HandleState) -> HandleState {
-        match &mut self.mapped {
-            None => *handle,
-            Some(mapped) => {
-                let is_clutched = handle.buttons & mapped.clutch != 0;
-                mapped.mapping.to_world(handle, is_clutched)
-            }
-        }
-    }
-
-    /// Pose of the tool that a handle in the world asks for, in the part's frame.
-    fn target(&self, handle: &HandleState) -> DPose3 {
-        self.held.target(&handle.pose)
-    }
-
-    /// On the handle about its point, world.
-    fn wrench_on_handle(&self, handle: &HandleState, report: &StepReport) -> Wrench {
-        self.held.wrench_on_handle(&handle.pose, report)
-    }
-
-    /// Tells the ports of a step, and gives the command for the device. `handle`: in the world.
-    fn tell(
-        &mut self,
-        handle: &HandleState,
-        answer: Answer,
-        contacts: &[ActiveContact],
-    ) -> Command {
-        let report = answer.report;
-        let gone = self.held.gone(&report.tool_pose, self.ports.direction);
-        let solved = Solved {
-            time_s: handle.time_s,
-            phase: self.drive.phase(handle.time_s, gone.travel),
-            handle_pose: handle.pose,
-            gone,
-            report,
-            wrench_on_handle: answer.wrench_on_handle,
-            step_ns: answer.step_ns,
-            contacts,
-        };
-        self.ports.solved(&self.held, &solved);
-        let on_handle = Command::from(answer.wrench_on_handle);
-        match &mut self.mapped {
-            None => on_handle,
-            Some(mapped) => {
-                let body = self.held.pose(&report.tool_pose);
-                mapped.hold_back(&handle.pose, &body);
-                mapped.mapping.to_device(&on_handle)
-            }
-        }
-    }
-}
-
-/// What a period came to.
-struct Answer {
-    report: StepReport,
-    wrench_on_handle: Wrench,
-    step_ns: u64,
-}
-
-impl Answer {
-    /// That of a frozen problem.
-    fn of_tick(tick: &Tick, begun: Instant) -> Self {
-        let step_ns = begun.elapsed().as_nanos() as u64;
-        let mut report = tick.report;
-        report.stage_ns[Stage::Lcp as usize] = step_ns;
-        Self {
-            report,
-            wrench_on_handle: tick.wrench_on_handle,
-            step_ns,
-        }
-    }
 }
 
 impl Session<'_> {

@@ -1,31 +1,30 @@
 //! `snapin live`: a scene in the hand, until it is ended.
 
 mod open;
+mod ready;
 mod told;
 
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::Receiver;
+use std::sync::mpsc::{Receiver, channel};
 use std::thread::ScopedJoinHandle;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use device::{Mapping, MappingSettings, Realtime, ServoSettings};
+use device::Realtime;
 
-use super::{CacheArgs, period_of, print};
-use crate::engine::Engine;
-use crate::prepare::{PreparedCompliance, PreparedPart, prepare};
+use super::{CacheArgs, print};
+use crate::Error;
 use crate::progress::Ui;
 use crate::scene::Scene;
-use crate::session::live::{self, LivePorts, LiveReport, LiveSpec};
+use crate::session::live::{self, LivePorts, LiveReport};
 use crate::session::log::{Log, Logged};
-use crate::session::rates::ChosenRates;
-use crate::session::{SessionSpec, Snapshot, SnapshotOutput, part_extent, snapshots};
+use crate::session::{Snapshot, SnapshotOutput, snapshots};
 use crate::shape::Shape;
-use crate::study::accuracy::resolved;
-use crate::{Error, drive, plausibility, setup};
+use open::Devices;
+use ready::{Loaded, Ready};
 use told::Told;
 
 #[derive(Debug, Args)]
@@ -36,6 +35,17 @@ pub(super) struct LiveArgs {
     /// scene's hand.
     #[arg(long, value_name = "NAME", default_value = "simulated")]
     device: String,
+    /// A second device for the other hand, which holds the other body (part or tool).
+    #[arg(long, value_name = "NAME")]
+    second_device: Option<String>,
+    /// Axes of the second device in the scene, as --axes.
+    #[arg(
+        long,
+        value_name = "AXES",
+        default_value = "+x+y+z",
+        allow_hyphen_values = true
+    )]
+    second_axes: open::Axes,
     /// Forces sent to the device per second, 100 to 10000 (default: the scene's device.servo_period).
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
@@ -82,75 +92,18 @@ const LOOKS_PER_STATUS: u64 = 6;
 pub(super) fn run(args: &LiveArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u8, Error> {
     let scene = Scene::load(&args.scene)?;
     let files = Files::new(args)?;
-    // Whether the device is there is known before an hour of preparing.
-    let external = open::external(&args.device)?;
-    let options = args.cache.options(false)?;
-    let (scene, picked) = resolved(scene, &options, ui)?;
-    let (tool, remarks) = setup::tool(&scene)?;
-    remarks.iter().chain(&picked).for_each(|line| ui.note(line));
-    let prepared = prepare(&setup::part_spec(&scene)?, &options, ui)?;
-    plausibility::tell(&plausibility::before(&scene, &prepared, &tool), ui);
-    let with_friction = drive::calls_for_friction(&scene, &prepared, tool.clone(), &ui.progress())?;
-    let scene = scene.with_friction(with_friction);
-
-    let held = setup::held(&scene, &prepared, &tool);
-    let session = setup::live_session(&scene, held, period(args, &scene)?);
-    let mut opened = match external {
-        Some(opened) => opened,
-        None => open::simulated(&args.device, scene.device.model, &session)?,
-    };
-    opened.notes.iter().for_each(|note| ui.note(note));
-    let limits = opened.limits(args.max_force)?;
-    let (scene, coupling) = open::coupled(scene, &limits, session.period_s)?;
-    let mut engine = setup::engine(&scene, &prepared, tool)?;
-    let rates = live::rates(&session, &prepared, &mut engine)?;
-    ui.note(&rates.words());
-    let mut shape = look_ahead_shape(&scene, &prepared, &engine, &options)?;
-
-    let mut spec = live_spec(args, session, &opened, &limits, &prepared)?;
-    if opened.is_rate {
-        // Nothing holds the hand back, and what a motor shakes does no work on it.
-        let largest = live::largest_force(&spec.session, &mut engine);
-        spec.stretch_max = Some(open::stretch(largest, &scene));
-        spec.servo.safety.passivity = None;
-    }
-    let about = BTreeMap::from([
-        ("title".to_owned(), scene.title.clone()),
-        ("scene".to_owned(), scene.path.display().to_string()),
-        ("scene_text".to_owned(), scene.source.clone()),
-        ("device".to_owned(), opened.device.name().to_owned()),
-        ("coupling".to_owned(), coupling.clone()),
-    ]);
-    let (log, samples) = match &files {
-        Some(files) => {
-            Log::create(&files.recording, &about).map(|(log, p)| (Some(log), Some(p)))?
-        }
-        None => (None, None),
-    };
-    let (viewer, view) = snapshots(engine.settings().max_contacts);
-    let (granted, granted_words) = std::sync::mpsc::channel();
-    let ports = LivePorts {
-        at_start: Some(Box::new(move || {
-            // Nobody listens where the session ended at once.
-            let _ = granted.send(Realtime::ask().to_string());
-        })),
-        viewer,
-        log: samples,
-    };
-    let mut eye = Eye {
-        view,
-        shape: shape.as_mut(),
-        messages: [&opened.messages, &granted_words],
-        ui,
-    };
-    let device = &mut *opened.device;
-    let (report, logged) = together(&spec, &rates, device, &mut engine, ports, log, &mut eye)?;
+    // Whether the devices are there is known before an hour of preparing.
+    let mut devices = Devices::external(args)?;
+    let loaded = Loaded::new(args, scene, ui)?;
+    devices.add_simulated(args, &loaded)?;
+    devices.notes().for_each(|note| ui.note(note));
+    let mut ready = Ready::new(args, loaded, devices.first()?)?;
+    ui.note(&ready.rates.words());
+    let (report, logged) = feel(args, &mut ready, &mut devices, files.as_ref(), ui)?;
     ui.end_status();
     let told = Told {
-        scene: &scene,
-        device: opened.device.name(),
-        coupling: &coupling,
-        period_s: spec.session.period_s,
+        ready: &ready,
+        devices: devices.names(),
         report: &report,
         logged: logged.as_ref(),
         recording: files.as_ref().map(|files| files.recording.as_path()),
@@ -163,62 +116,64 @@ pub(super) fn run(args: &LiveArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u
     Ok(0)
 }
 
-/// Time between two forces, s.
-fn period(args: &LiveArgs, scene: &Scene) -> Result<f64, Error> {
-    args.rate.map_or(Ok(scene.device.servo_period), period_of)
-}
-
-/// The session's settings.
-fn live_spec(
+/// The session itself: the loop on a thread of its own, the recording on another, and this one looks on.
+fn feel(
     args: &LiveArgs,
-    session: SessionSpec,
-    opened: &open::Hand,
-    limits: &device::Limits,
-    prepared: &PreparedPart,
-) -> Result<LiveSpec, Error> {
-    let mapping = MappingSettings {
-        axes: args.axes.0,
-        scale: args.scale,
-        ..MappingSettings::default()
+    ready: &mut Ready,
+    devices: &mut Devices,
+    files: Option<&Files>,
+    ui: &Ui<'_>,
+) -> Result<(LiveReport, Option<Logged>), Error> {
+    let about = BTreeMap::from([
+        ("title".to_owned(), ready.scene.title.clone()),
+        ("scene".to_owned(), ready.scene.path.display().to_string()),
+        ("scene_text".to_owned(), ready.scene.source.clone()),
+        ("device".to_owned(), devices.names()),
+        ("coupling".to_owned(), ready.coupling.clone()),
+    ]);
+    let log = files.map(|files| Log::create(&files.recording, &about));
+    let (log, samples) = log.transpose()?.unzip();
+    let (viewer, view) = snapshots(ready.engine.settings().max_contacts);
+    let (granted, granted_words) = channel();
+    let ports = LivePorts {
+        at_start: Some(Box::new(move || {
+            // Nobody listens where the session ended at once.
+            let _ = granted.send(Realtime::ask().to_string());
+        })),
+        viewer,
+        log: samples,
     };
-    // A simulated hand goes along the scene's way in the scene's world.
-    let mapping = match opened.is_in_world {
-        true => None,
-        false => Some(Mapping::new(mapping, session.held.start())?),
+    let (hands, mut messages) = devices.hands(args, ready)?;
+    messages.push(&granted_words);
+    let mut eye = Eye {
+        view,
+        shape: ready.shape.as_mut(),
+        messages,
+        ui,
     };
-    let seconds = match (args.seconds, opened.ends_after_s) {
-        (Some(asked), Some(scripted)) => Some(asked.min(scripted)),
-        (asked, scripted) => asked.or(scripted),
-    };
-    if let Some(seconds) = seconds.filter(|s| !(s.is_finite() && *s > 0.0)) {
-        return Err(Error::Input(format!(
-            "--for {seconds} is no time above 0 s"
-        )));
-    }
-    Ok(LiveSpec {
-        n_periods: seconds.map(|s| (s / session.period_s).ceil() as u64),
-        mapping,
-        clutch: args.clutch.map_or(0, |button| 1 << (button - 1)),
-        stretch_max: None,
-        lever: part_extent(&prepared.loaded.mesh),
-        servo: ServoSettings::live(limits)?,
-        session,
+    let (stop, is_written) = (AtomicBool::new(false), AtomicBool::new(false));
+    let (spec, rates, engine) = (&ready.spec, &ready.rates, &mut ready.engine);
+    std::thread::scope(|scope| {
+        let written = log.map(|log| scope.spawn(|| log.write(&is_written)));
+        let haptic = std::thread::Builder::new()
+            .name("haptic loop".to_owned())
+            .spawn_scoped(scope, || {
+                live::run(spec, rates, hands, engine, ports, &stop)
+            })
+            .map_err(Error::io(
+                Path::new("the haptic loop"),
+                "start the thread of",
+            ))?;
+        eye.look_on(&haptic);
+        is_written.store(true, Ordering::Release);
+        let report = haptic.join().map_err(|_| Error::EngineEnded)?;
+        let logged = written.map(|thread| thread.join().map_err(|_| Error::EngineEnded));
+        let logged = logged.transpose()?.transpose().unwrap_or_else(|error| {
+            ui.note(&format!("warning: the recording is cut short: {error}"));
+            None
+        });
+        Ok((report?, logged))
     })
-}
-
-/// Where columns of the compliance are fetched, what fetches them ahead of the tool.
-fn look_ahead_shape(
-    scene: &Scene,
-    prepared: &PreparedPart,
-    engine: &Engine,
-    options: &crate::prepare::PrepareOptions,
-) -> Result<Option<Shape>, Error> {
-    let PreparedCompliance::Near(_) = &prepared.compliance else {
-        return Ok(None);
-    };
-    let mut shape = Shape::new(prepared, &scene.accuracy, options.cache_dir.as_deref())?;
-    shape.follow(engine, true);
-    Ok(Some(shape))
 }
 
 /// The files of a session: the first number that is free.
@@ -252,49 +207,11 @@ impl Files {
     }
 }
 
-/// The loop on a thread of its own, the recording on another, and this one looks on.
-fn together(
-    spec: &LiveSpec,
-    rates: &ChosenRates,
-    device: &mut dyn device::HapticDevice,
-    engine: &mut Engine,
-    ports: LivePorts<'_>,
-    log: Option<Log>,
-    eye: &mut Eye<'_, '_>,
-) -> Result<(LiveReport, Option<Logged>), Error> {
-    let (stop, is_written) = (AtomicBool::new(false), AtomicBool::new(false));
-    std::thread::scope(|scope| {
-        let written = log.map(|log| scope.spawn(|| log.write(&is_written)));
-        let haptic = std::thread::Builder::new()
-            .name("haptic loop".to_owned())
-            .spawn_scoped(scope, || {
-                live::run(spec, rates, device, engine, ports, &stop)
-            })
-            .map_err(Error::io(
-                Path::new("the haptic loop"),
-                "start the thread of",
-            ))?;
-        eye.look_on(&haptic);
-        is_written.store(true, Ordering::Release);
-        let report = haptic.join().map_err(|_| Error::EngineEnded)?;
-        let logged = written.map(|thread| thread.join().map_err(|_| Error::EngineEnded));
-        let logged = match logged.transpose()?.transpose() {
-            Ok(logged) => logged,
-            Err(error) => {
-                eye.ui
-                    .note(&format!("warning: the recording is cut short: {error}"));
-                None
-            }
-        };
-        Ok((report?, logged))
-    })
-}
-
 /// What looks on while the loop goes: messages, status, and the columns that come next.
 struct Eye<'a, 'u> {
     view: SnapshotOutput,
     shape: Option<&'a mut Shape>,
-    messages: [&'a Receiver<String>; 2],
+    messages: Vec<&'a Receiver<String>>,
     ui: &'a Ui<'u>,
 }
 

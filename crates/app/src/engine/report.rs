@@ -110,7 +110,7 @@ pub struct StepReport {
 }
 
 impl StepReport {
-    pub(super) fn at(target: &DPose3) -> Self {
+    pub(crate) fn at(target: &DPose3) -> Self {
         Self {
             tool_pose: *target,
             contact_wrench_on_tool: [0.0; 6],

@@ -63,6 +63,15 @@ impl Held {
         }
     }
 
+    /// The other body, held at its centre.
+    pub fn other(&self, tool: &Tool, mesh: &Mesh) -> Self {
+        let holds = match self.holds {
+            Holds::Tool => Holds::Part,
+            Holds::Part => Holds::Tool,
+        };
+        Self::centred(holds, self.tool_pose, tool, mesh)
+    }
+
     /// Where the engine's coupling is fastened.
     pub fn engine_grip(&self) -> Grip {
         match self.holds {
@@ -146,7 +155,7 @@ impl Held {
 }
 
 /// The same axes at a point given in the pose's own frame.
-fn at_grip(pose: &DPose3, grip: DVec3) -> DPose3 {
+pub(super) fn at_grip(pose: &DPose3, grip: DVec3) -> DPose3 {
     DPose3 {
         translation: pose.translation + pose.rotation * grip,
         ..*pose

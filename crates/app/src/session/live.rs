@@ -4,11 +4,14 @@ use std::sync::atomic::AtomicBool;
 
 use device::{Clock, HapticDevice, Mapping, RealTime, Servo, ServoReport, ServoSettings};
 
+use super::course::{Course, Mapped};
 use super::drive::{Drive, Heading};
 use super::fast::FastSettings;
+use super::other::Other;
+pub use super::other::{SecondHand, SecondReport};
 use super::ports::{Ports, SnapshotInput};
 use super::rates::{ChosenRates, TwoRates, choose};
-use super::{Course, Mapped, Sample, Session, SessionSpec, SnapWatch, refuse_overlap};
+use super::{Sample, Session, SessionSpec, SnapWatch, refuse_overlap};
 use crate::Error;
 use crate::engine::Engine;
 use crate::prepare::PreparedPart;
@@ -38,6 +41,14 @@ pub struct LiveSpec {
     pub servo: ServoSettings,
 }
 
+/// The devices.
+pub struct Hands<'a> {
+    /// Holds the scene's held body and keeps the loop's time.
+    pub first: &'a mut dyn HapticDevice,
+    /// Holds the other body.
+    pub second: Option<SecondHand<'a>>,
+}
+
 /// Who listens.
 pub struct LivePorts<'a> {
     /// Called on the loop's thread, just before the first period.
@@ -59,6 +70,8 @@ pub struct LiveReport {
     pub n_unlogged: u64,
     /// What two rates tell, if there were two.
     pub two_rates: Option<TwoRates>,
+    /// What came of the second device, if there was one.
+    pub second: Option<SecondReport>,
 }
 
 /// Whether whole steps are solved in the loop, by a rehearsal of the scene's way; also warms the engine up.
@@ -95,40 +108,42 @@ pub fn largest_force(spec: &SessionSpec, engine: &mut Engine) -> f64 {
 ///
 /// # Errors
 /// Settings that the loop refuses; an engine that ended on its own beside the loop.
-pub fn run(
+pub fn run<'a>(
     spec: &LiveSpec,
     rates: &ChosenRates,
-    device: &mut dyn HapticDevice,
+    hands: Hands<'a>,
     engine: &mut Engine,
-    ports: LivePorts<'_>,
-    stop: &AtomicBool,
+    ports: LivePorts<'a>,
+    stop: &'a AtomicBool,
 ) -> Result<LiveReport, Error> {
     let clock = RealTime::with_spin(spec.session.period_s, SPIN_S)?;
-    run_on(clock, spec, rates, device, engine, ports, stop)
+    run_on(clock, spec, rates, hands, engine, ports, stop)
 }
 
 /// The same on any clock.
 ///
 /// # Errors
 /// As [`run`].
-pub fn run_on<C: Clock>(
+pub fn run_on<'a, C: Clock>(
     clock: C,
     spec: &LiveSpec,
     rates: &ChosenRates,
-    device: &mut dyn HapticDevice,
+    hands: Hands<'a>,
     engine: &mut Engine,
-    ports: LivePorts<'_>,
-    stop: &AtomicBool,
+    ports: LivePorts<'a>,
+    stop: &'a AtomicBool,
 ) -> Result<LiveReport, Error> {
     let fast = FastSettings {
         period_s: spec.session.period_s,
-        force_resolution: device.limits().force_resolution,
+        force_resolution: hands.first.limits().force_resolution,
         lever: spec.lever,
         n_ticks: KEPT_TICKS,
     };
     let mut servo = Servo::new(clock, spec.servo)?;
+    let second = hands.second;
+    let other = second.map(|hand| Other::new(hand, spec.session.period_s));
     let mut session = Session {
-        device,
+        device: hands.first,
         course: Course {
             held: spec.session.held,
             mapped: spec.mapping.clone().map(|mapping| Mapped {
@@ -136,6 +151,7 @@ pub fn run_on<C: Clock>(
                 clutch: spec.clutch,
                 stretch_max: spec.stretch_max,
             }),
+            other: other.transpose()?,
             drive: Drive::Live {
                 stop,
                 n_periods: spec.n_periods,
@@ -151,14 +167,20 @@ pub fn run_on<C: Clock>(
         at_start: ports.at_start,
         progress: &fem::Silent,
     };
-    let two_rates = match rates.every {
+    let outcome = match rates.every {
         None => session.one_rate(&mut servo, engine, None).map(|()| None),
         Some(_) => session.two_rates_beside(&mut servo, engine, fast).map(Some),
-    }?;
+    };
+    let second = session.course.other.as_mut().map(|other| {
+        other.release();
+        other.report()
+    });
+    let two_rates = outcome?;
     Ok(LiveReport {
         servo: servo.report(),
         snap: session.course.ports.snap,
         n_unlogged: session.course.ports.n_unlogged,
         two_rates,
+        second,
     })
 }

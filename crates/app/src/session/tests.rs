@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use contact::lcp;
 use contact::tool::{Sphere, Tool};
 use device::VirtualCoupling;
+use glamx::DPose3;
 
 use super::fast::FastLoop;
 use super::handover::Handed;
@@ -94,6 +95,7 @@ fn run_with(
         course: Course {
             held: spec.held,
             mapped: None,
+            other: None,
             drive: Drive::Scripted {
                 script,
                 n_periods: N_PERIODS,

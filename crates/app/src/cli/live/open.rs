@@ -6,17 +6,111 @@ use std::sync::mpsc::{Receiver, channel};
 use device::driver::simulated::Model;
 use device::driver::{self, Unavailable};
 use device::{
-    ChosenCoupling, CouplingWish, HapticDevice, Insertion, Limits, Script, Simulated, SimulatedHand,
+    ChosenCoupling, CouplingWish, HapticDevice, Insertion, Limits, SafetySettings, Script,
+    Simulated, SimulatedHand,
 };
 use glam::{DMat3, DQuat, DVec3};
 
+use super::LiveArgs;
+use super::ready::{Loaded, Ready};
 use crate::Error;
 use crate::report::plot::short;
 use crate::scene::{DeviceModel, Scene};
-use crate::session::SessionSpec;
+use crate::session::live::{Hands, SecondHand};
+use crate::session::{Held, SessionSpec};
 
 /// What stands before the colon of a simulated device's name.
 const SIMULATED: &str = "simulated";
+
+const DEVICE: &str = "--device";
+const SECOND: &str = "--second-device";
+
+/// The devices of a session.
+pub(super) struct Devices {
+    first: Option<Hand>,
+    second: Option<Hand>,
+}
+
+impl Devices {
+    /// Those that are really there.
+    ///
+    /// # Errors
+    /// Why one cannot be opened.
+    pub(super) fn external(args: &LiveArgs) -> Result<Self, Error> {
+        let second = args.second_device.as_deref();
+        let second = second.map(|name| external(SECOND, name));
+        Ok(Self {
+            first: external(DEVICE, &args.device)?,
+            second: second.transpose()?.flatten(),
+        })
+    }
+
+    /// The simulated ones: the first is held by the scene's hand, the second by one that rests.
+    ///
+    /// # Errors
+    /// A model that does not exist; a way that leaves the device's workspace.
+    pub(super) fn add_simulated(&mut self, args: &LiveArgs, loaded: &Loaded) -> Result<(), Error> {
+        let session = &loaded.session;
+        if self.first.is_none() {
+            let of_scene = loaded.scene.device.model;
+            self.first = Some(simulated(&args.device, of_scene, session)?);
+        }
+        if let (None, Some(name)) = (&self.second, &args.second_device) {
+            self.second = Some(resting(name, &loaded.other(), session)?);
+        }
+        Ok(())
+    }
+
+    fn all(&self) -> impl Iterator<Item = &Hand> {
+        self.first.iter().chain(&self.second)
+    }
+
+    /// What the user should know at once.
+    pub(super) fn notes(&self) -> impl Iterator<Item = &String> {
+        self.all().flat_map(|hand| &hand.notes)
+    }
+
+    /// Of both.
+    pub(super) fn names(&self) -> String {
+        let names: Vec<&str> = self.all().map(|hand| hand.device.name()).collect();
+        names.join(" and ")
+    }
+
+    /// # Errors
+    /// Where none was opened.
+    pub(super) fn first(&self) -> Result<&Hand, Error> {
+        let none = || Error::Input("no device is open".to_owned());
+        self.first.as_ref().ok_or_else(none)
+    }
+
+    /// For the session, and what they will tell.
+    ///
+    /// # Errors
+    /// A scale or limits that are none.
+    pub(super) fn hands(
+        &mut self,
+        args: &LiveArgs,
+        ready: &Ready,
+    ) -> Result<(Hands<'_>, Vec<&Receiver<String>>), Error> {
+        let first = self.first.as_mut();
+        let first = first.ok_or_else(|| Error::Input("no device is open".to_owned()))?;
+        let mut messages = vec![&first.messages];
+        let second = match &mut self.second {
+            None => None,
+            Some(hand) => {
+                messages.push(&hand.messages);
+                Some(SecondHand {
+                    held: ready.other,
+                    mapping: hand.mapping(args.second_axes, args.scale, ready.other)?,
+                    safety: SafetySettings::live(&hand.limits(args.max_force)?)?,
+                    device: &mut *hand.device,
+                })
+            }
+        };
+        let first = &mut *first.device;
+        Ok((Hands { first, second }, messages))
+    }
+}
 
 /// A device, ready.
 pub(super) struct Hand {
@@ -58,11 +152,11 @@ impl Hand {
 ///
 /// # Errors
 /// Why it cannot be opened.
-pub(super) fn external(name: &str) -> Result<Option<Hand>, Error> {
+fn external(flag: &str, name: &str) -> Result<Option<Hand>, Error> {
     if name.split(':').next() == Some(SIMULATED) {
         return Ok(None);
     }
-    let opened = driver::open(name).map_err(|why| cannot(name, &why))?;
+    let opened = driver::open(name).map_err(|why| cannot(flag, name, &why))?;
     Ok(Some(Hand {
         device: opened.device,
         notes: opened.notes,
@@ -73,23 +167,19 @@ pub(super) fn external(name: &str) -> Result<Option<Hand>, Error> {
     }))
 }
 
-fn cannot(name: &str, why: &Unavailable) -> Error {
-    Error::Input(format!("--device {name}: {why}"))
+fn cannot(flag: &str, name: &str, why: &Unavailable) -> Error {
+    Error::Input(format!("{flag} {name}: {why}"))
 }
 
 /// A simulated device, held by the scene's hand.
 ///
 /// # Errors
 /// A model that does not exist; a way that leaves the device's workspace.
-pub(super) fn simulated(
-    name: &str,
-    of_scene: DeviceModel,
-    session: &SessionSpec,
-) -> Result<Hand, Error> {
+fn simulated(name: &str, of_scene: DeviceModel, session: &SessionSpec) -> Result<Hand, Error> {
     let place = name
         .split_once(':')
         .map_or(of_scene.key(), |(_, place)| place);
-    let model = Model::named(place).map_err(|why| cannot(name, &why))?;
+    let model = Model::named(place).map_err(|why| cannot(DEVICE, name, &why))?;
     let script = Script::new(&Insertion {
         start: session.held.start(),
         direction: session.direction,
@@ -100,17 +190,34 @@ pub(super) fn simulated(
     })?;
     let ends_after_s = script.periods(session.period_s) as f64 * session.period_s;
     let hand = SimulatedHand::new(session.hand, script, session.period_s)?;
-    let device = Simulated::of_model(model, hand)?;
-    // Nothing happens to a simulated device.
+    Ok(in_world(
+        Simulated::of_model(model, hand)?,
+        Some(ends_after_s),
+    ))
+}
+
+/// A simulated device that holds the other body, in a hand that rests.
+///
+/// # Errors
+/// A model that does not exist.
+fn resting(name: &str, held: &Held, session: &SessionSpec) -> Result<Hand, Error> {
+    let (_, place) = name.split_once(':').unwrap_or((name, ""));
+    let model = Model::named(place).map_err(|why| cannot(SECOND, name, &why))?;
+    let hand = SimulatedHand::resting(session.hand, held.start(), session.period_s)?;
+    Ok(in_world(Simulated::of_model(model, hand)?, None))
+}
+
+/// A simulated device is where its hand is in the world, and nothing happens to it.
+fn in_world(device: Simulated, ends_after_s: Option<f64>) -> Hand {
     let (_, messages) = channel();
-    Ok(Hand {
+    Hand {
+        device: Box::new(device),
         notes: Vec::new(),
         messages,
         is_in_world: true,
         is_rate: false,
-        ends_after_s: Some(ends_after_s),
-        device: Box::new(device),
-    })
+        ends_after_s,
+    }
 }
 
 /// The scene with the coupling that the device allows where the scene states none; with what to tell of it.

@@ -2,19 +2,18 @@
 
 use std::path::Path;
 
+use device::SafetyEvents;
 use serde_json::{Value, json};
 
 use super::super::json_text;
-use crate::scene::Scene;
+use super::ready::Ready;
 use crate::session::live::LiveReport;
 use crate::session::log::Logged;
 
 /// A session that is over.
 pub(super) struct Told<'a> {
-    pub(super) scene: &'a Scene,
-    pub(super) device: &'a str,
-    pub(super) coupling: &'a str,
-    pub(super) period_s: f64,
+    pub(super) ready: &'a Ready,
+    pub(super) devices: String,
     pub(super) report: &'a LiveReport,
     pub(super) logged: Option<&'a Logged>,
     pub(super) recording: Option<&'a Path>,
@@ -31,9 +30,9 @@ impl Told<'_> {
              pulling out           {:.3} N at {:.3} mm; came off {}\n  \
              loop                  {} periods of {} ms, {} missed ({} in a row at most), {} skipped\n  \
              response              median {:.1} us, 99 % below {:.1} us, longest {:.1} us; woken late by {:.1}, {:.1}, {:.1} us\n",
-            self.scene.title,
-            self.device,
-            self.coupling,
+            self.ready.scene.title,
+            self.devices,
+            self.ready.coupling,
             snap.peak_force,
             1e3 * snap.travel_at_peak,
             times(snap.n_snaps_in),
@@ -41,7 +40,7 @@ impl Told<'_> {
             1e3 * snap.travel_at_retention,
             times(snap.n_snaps_out),
             servo.periods,
-            1e3 * self.period_s,
+            1e3 * self.ready.spec.session.period_s,
             servo.missed_deadlines,
             servo.longest_miss_run,
             servo.skipped,
@@ -52,7 +51,11 @@ impl Told<'_> {
             us(servo.wake_delay.p99_s),
             us(servo.wake_delay.max_s),
         );
-        text += &format!("  guard                 {}\n", self.guard_words());
+        text += &format!("  guard                 {}\n", guard_words(&servo.safety));
+        if let Some(second) = &self.report.second {
+            let words = guard_words(&second.safety);
+            text += &format!("  of the second device  {words}\n");
+        }
         if let (Some(path), Some(logged)) = (self.recording, self.logged) {
             text += &format!(
                 "  recording             {} ({} steps{})\n",
@@ -67,42 +70,23 @@ impl Told<'_> {
         text
     }
 
-    /// What the guard did, without what it did not.
-    fn guard_words(&self) -> String {
-        let events = guard(self.report);
-        let seen: Vec<String> = events
-            .iter()
-            .filter(|(_, n)| *n > 0)
-            .map(|(what, n)| format!("{what} {n}"))
-            .collect();
-        if seen.is_empty() {
-            "nothing to do".to_owned()
-        } else {
-            seen.join(", ")
-        }
-    }
-
     /// For programs.
     pub(super) fn json(&self) -> String {
         let (snap, servo) = (&self.report.snap, &self.report.servo);
         let times =
             |t: &device::TimeSummary| json!({"p50": t.p50_s, "p99": t.p99_s, "max": t.max_s});
-        let events: serde_json::Map<String, Value> = guard(self.report)
-            .into_iter()
-            .map(|(what, n)| (what.replace(": ", "_").replace(' ', "_"), json!(n)))
-            .collect();
         json_text(&json!({
-            "title": self.scene.title,
-            "scene": self.scene.path,
-            "device": self.device,
-            "coupling": self.coupling,
+            "title": self.ready.scene.title,
+            "scene": self.ready.scene.path,
+            "device": self.devices,
+            "coupling": self.ready.coupling,
             "peak_insertion_force_N": snap.peak_force,
             "travel_at_peak_m": snap.travel_at_peak,
             "peak_retention_force_N": snap.peak_retention,
             "travel_at_retention_m": snap.travel_at_retention,
             "snaps_in": snap.n_snaps_in,
             "snaps_out": snap.n_snaps_out,
-            "period_s": self.period_s,
+            "period_s": self.ready.spec.session.period_s,
             "periods": servo.periods,
             "missed": servo.missed_deadlines,
             "longest_miss_run": servo.longest_miss_run,
@@ -110,7 +94,9 @@ impl Told<'_> {
             "wake_delay_s": times(&servo.wake_delay),
             "compute_s": times(&servo.compute),
             "response_s": times(&servo.response),
-            "guard": events,
+            "guard": guard_json(&servo.safety),
+            "second_guard": self.report.second.as_ref().map(|s| guard_json(&s.safety)),
+            "second_failures": self.report.second.as_ref().map(|s| s.failures),
             "recording": self.recording,
             "recorded_steps": self.logged.map(|l| l.n_steps),
             "unrecorded_steps": self.report.n_unlogged,
@@ -127,9 +113,28 @@ fn times(n: u32) -> String {
     }
 }
 
+/// What the guard did, without what it did not.
+fn guard_words(events: &SafetyEvents) -> String {
+    let seen: Vec<String> = guard(events)
+        .iter()
+        .filter(|(_, n)| *n > 0)
+        .map(|(what, n)| format!("{what} {n}"))
+        .collect();
+    if seen.is_empty() {
+        "nothing to do".to_owned()
+    } else {
+        seen.join(", ")
+    }
+}
+
+fn guard_json(events: &SafetyEvents) -> Value {
+    let all = guard(events).into_iter();
+    let named = all.map(|(what, n)| (what.replace(": ", "_").replace(' ', "_"), json!(n)));
+    Value::Object(named.collect())
+}
+
 /// What the guard counts, in words.
-fn guard(report: &LiveReport) -> Vec<(&'static str, u64)> {
-    let events = &report.servo.safety;
+fn guard(events: &SafetyEvents) -> Vec<(&'static str, u64)> {
     vec![
         ("samples missing", events.samples_missing),
         ("samples not finite", events.samples_non_finite),

@@ -1,0 +1,163 @@
+//! What a live session is made of, before its first period.
+
+use contact::tool::Tool;
+use device::{Mapping, MappingSettings, ServoSettings};
+
+use super::LiveArgs;
+use super::open::{self, Hand};
+use crate::Error;
+use crate::cli::period_of;
+use crate::engine::Engine;
+use crate::prepare::{PrepareOptions, PreparedCompliance, PreparedPart, prepare};
+use crate::progress::Ui;
+use crate::scene::Scene;
+use crate::session::live::{self, LiveSpec};
+use crate::session::rates::ChosenRates;
+use crate::session::{Held, SessionSpec, part_extent};
+use crate::shape::Shape;
+use crate::study::accuracy::resolved;
+use crate::{drive, plausibility, setup};
+
+/// A scene with its part, whatever device comes.
+pub(super) struct Loaded {
+    pub(super) scene: Scene,
+    pub(super) prepared: PreparedPart,
+    pub(super) session: SessionSpec,
+    tool: Tool,
+    options: PrepareOptions,
+}
+
+impl Loaded {
+    /// Prepares the part, and sees by the scene's own way whether friction is called for.
+    ///
+    /// # Errors
+    /// What the scene, its mesh or its tool are refused for; Ctrl-C.
+    pub(super) fn new(args: &LiveArgs, scene: Scene, ui: &Ui<'_>) -> Result<Self, Error> {
+        let options = args.cache.options(false)?;
+        let (scene, picked) = resolved(scene, &options, ui)?;
+        let (tool, remarks) = setup::tool(&scene)?;
+        let notes = remarks.iter().chain(&picked);
+        notes.for_each(|line| ui.note(line));
+        let prepared = prepare(&setup::part_spec(&scene)?, &options, ui)?;
+        plausibility::tell(&plausibility::before(&scene, &prepared, &tool), ui);
+        let progress = ui.progress();
+        let has_friction = drive::calls_for_friction(&scene, &prepared, tool.clone(), &progress)?;
+        let scene = scene.with_friction(has_friction);
+        let period_s = args.rate.map_or(Ok(scene.device.servo_period), period_of)?;
+        let held = setup::held(&scene, &prepared, &tool);
+        Ok(Self {
+            session: setup::live_session(&scene, held, period_s),
+            scene,
+            prepared,
+            tool,
+            options,
+        })
+    }
+
+    /// The body that the first device does not hold.
+    pub(super) fn other(&self) -> Held {
+        let mesh = &self.prepared.loaded.mesh;
+        self.session.held.other(&self.tool, mesh)
+    }
+}
+
+/// All of it.
+pub(super) struct Ready {
+    pub(super) scene: Scene,
+    /// The virtual coupling, and why it is so stiff.
+    pub(super) coupling: String,
+    pub(super) engine: Engine,
+    pub(super) rates: ChosenRates,
+    pub(super) spec: LiveSpec,
+    /// What fetches columns of the compliance ahead of the tool, where they are fetched.
+    pub(super) shape: Option<Shape>,
+    /// The body of a second device.
+    pub(super) other: Held,
+}
+
+impl Ready {
+    /// # Errors
+    /// A tool that overlaps the part; settings that are refused.
+    pub(super) fn new(args: &LiveArgs, loaded: Loaded, first: &Hand) -> Result<Self, Error> {
+        let limits = first.limits(args.max_force)?;
+        let other = loaded.other();
+        let Loaded {
+            scene,
+            prepared,
+            session,
+            tool,
+            options,
+        } = loaded;
+        let (scene, coupling) = open::coupled(scene, &limits, session.period_s)?;
+        let mut engine = setup::engine(&scene, &prepared, tool)?;
+        let rates = live::rates(&session, &prepared, &mut engine)?;
+        let shape = match &prepared.compliance {
+            PreparedCompliance::All(_) => None,
+            PreparedCompliance::Near(_) => {
+                let folder = options.cache_dir.as_deref();
+                let mut shape = Shape::new(&prepared, &scene.accuracy, folder)?;
+                shape.follow(&engine, true);
+                Some(shape)
+            }
+        };
+        let mut spec = LiveSpec {
+            n_periods: first.n_periods(args.seconds, session.period_s)?,
+            mapping: first.mapping(args.axes, args.scale, session.held)?,
+            clutch: args.clutch.map_or(0, |button| 1 << (button - 1)),
+            stretch_max: None,
+            lever: part_extent(&prepared.loaded.mesh),
+            servo: ServoSettings::live(&limits)?,
+            session,
+        };
+        if first.is_rate {
+            // Nothing holds the hand back, and what a motor shakes does no work on it.
+            let largest = live::largest_force(&spec.session, &mut engine);
+            spec.stretch_max = Some(open::stretch(largest, &scene));
+            spec.servo.safety.passivity = None;
+        }
+        Ok(Self {
+            scene,
+            coupling,
+            engine,
+            rates,
+            spec,
+            shape,
+            other,
+        })
+    }
+}
+
+impl Hand {
+    /// From its frame to the world; `None` where its frame is the world.
+    ///
+    /// # Errors
+    /// A scale that is none.
+    pub(super) fn mapping(
+        &self,
+        axes: open::Axes,
+        scale: f64,
+        held: Held,
+    ) -> Result<Option<Mapping>, Error> {
+        if self.is_in_world {
+            return Ok(None);
+        }
+        let settings = MappingSettings {
+            axes: axes.0,
+            scale,
+            ..MappingSettings::default()
+        };
+        Ok(Some(Mapping::new(settings, held.start())?))
+    }
+
+    /// Periods at most: as long as the user says, and as its script goes.
+    fn n_periods(&self, seconds: Option<f64>, period_s: f64) -> Result<Option<u64>, Error> {
+        if let Some(seconds) = seconds.filter(|s| !(s.is_finite() && *s > 0.0)) {
+            return Err(Error::Input(format!(
+                "--for {seconds} is no time above 0 s"
+            )));
+        }
+        let least = seconds.into_iter().chain(self.ends_after_s);
+        let least = least.min_by(f64::total_cmp);
+        Ok(least.map(|s| (s / period_s).ceil() as u64))
+    }
+}

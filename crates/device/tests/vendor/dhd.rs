@@ -36,8 +36,7 @@ fn drive(stub: &Stub, opened: &mut Opened) {
 }
 
 fn is_zero(stub: &Stub) -> bool {
-    stub.newest("dhdSetForce")
-        .is_some_and(|n| n.iter().all(|x| *x == 0.0))
+    stub.is_at_zero("dhdSetForce")
 }
 
 #[test]
@@ -294,9 +293,10 @@ fn pose_or_velocity_that_is_none_is_told_and_gets_no_force() {
         ("scale", -1.0, 1.0),
         ("speed", f64::NAN, 0.0),
     ] {
+        let before = stub.lines();
         stub.set(knob, bad);
         message(&opened, "no pose");
-        wait_until("zero force", || is_zero(&stub));
+        stub.wait_for_zeros(&mut opened, wrench(), before, "dhdSetForce", "dhdClose");
         stub.set(knob, good);
         drive(&stub, &mut opened);
         assert!(read_until(&mut opened, "a sample", |_| true).is_finite());

@@ -118,6 +118,42 @@ impl Stub {
         calls.iter().rev().find_map(|line| numbers(line, call))
     }
 
+    /// Were the last ten calls ones with zeros alone? A single one may be the driver's answer to a stall of the test.
+    pub(crate) fn is_at_zero(&self, call: &str) -> bool {
+        let calls = self.calls_from(self.lines().saturating_sub(50));
+        let all: Vec<Vec<f64>> = calls
+            .iter()
+            .filter_map(|line| numbers(line, call))
+            .collect();
+        all.len() >= 10 && all[all.len() - 10..].iter().flatten().all(|x| *x == 0.0)
+    }
+
+    /// Waits for ten calls in a row with zeros alone, after so many lines and before the device is given up.
+    pub(crate) fn wait_for_zeros(
+        &self,
+        opened: &mut Opened,
+        wrench: Wrench,
+        from: usize,
+        call: &str,
+        close: &str,
+    ) {
+        drive_until(opened, wrench, "zero force", |_| {
+            let calls = self.calls_from(from);
+            let is_open = |line: &&String| !is_of(line, close);
+            let kept: Vec<&String> = calls.iter().take_while(is_open).collect();
+            let all = kept.iter().filter_map(|line| numbers(line, call));
+            let is_zero: Vec<bool> = all.map(|n| n.iter().all(|x| *x == 0.0)).collect();
+            let runs = is_zero.split(|is_zero| !is_zero);
+            let zeros = runs.map(<[bool]>::len).max().unwrap_or(0);
+            assert!(
+                zeros >= 10 || kept.len() == calls.len(),
+                "given up without zero force: {:?}",
+                tail(&calls)
+            );
+            zeros >= 10
+        });
+    }
+
     /// Was a call with zeros alone among those after so many lines?
     pub(crate) fn has_zero_since(&self, from: usize, call: &str) -> bool {
         let calls = self.calls_from(from);

@@ -37,12 +37,9 @@ fn drive(stub: &Stub, opened: &mut Opened) {
     });
 }
 
-/// Is the last wrench that the library was given zero?
+/// Is the library given no force?
 fn is_zero(stub: &Stub) -> bool {
-    stub.newest("virtSetForce")
-        .unwrap()
-        .iter()
-        .all(|n| *n == 0.0)
+    stub.is_at_zero("virtSetForce")
 }
 
 #[test]
@@ -270,9 +267,10 @@ fn pose_that_is_none_is_told_and_gets_no_force() {
     let mut opened = open(&stub);
     drive(&stub, &mut opened);
     for scale in [f64::NAN, f64::INFINITY, 0.0, 1.5] {
+        let before = stub.lines();
         stub.set("scale", scale);
         message(&opened, "no pose");
-        wait_until("zero force", || is_zero(&stub));
+        stub.wait_for_zeros(&mut opened, wrench(), before, "virtSetForce", "virtClose");
         stub.set("scale", 1.0);
         drive(&stub, &mut opened);
         let state = read_until(&mut opened, "a sample", |_| true);

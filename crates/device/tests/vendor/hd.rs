@@ -287,6 +287,7 @@ fn frame_that_fails_once_is_told_and_the_next_goes_on() {
         stub.has_zero_since(before, FORCE)
     });
     drive(&stub, &mut opened);
+    assert!(stub.has_risen_slowly_to(1.0, before, FORCE));
     assert_eq!(stub.count("hdInitDevice"), 1);
 }
 

@@ -163,6 +163,13 @@ impl Stub {
             .any(|n| n.iter().all(|x| *x == 0.0))
     }
 
+    /// Did the first number of the calls after so many lines take many values between zero and this one?
+    pub(crate) fn has_risen_slowly_to(&self, full: f64, from: usize, call: &str) -> bool {
+        let calls = self.calls_from(from);
+        let all = calls.iter().filter_map(|line| numbers(line, call));
+        all.filter(|n| n[0] > 0.0 && n[0] < full).count() >= 5
+    }
+
     /// Was the call before this place one with zeros alone?
     pub(crate) fn is_zero_before(&self, place: usize, call: &str) -> bool {
         numbers(&self.calls()[place - 1], call).is_some_and(|n| n.iter().all(|x| *x == 0.0))

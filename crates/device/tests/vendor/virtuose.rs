@@ -257,6 +257,7 @@ fn call_that_fails_once_is_told_and_the_next_exchange_goes_on() {
             stub.has_zero_since(before, "virtSetForce")
         });
         drive(&stub, &mut opened);
+        assert!(stub.has_risen_slowly_to(3.0, before, "virtSetForce"));
         assert_eq!(stub.count("virtOpen"), 1);
     }
 }

@@ -163,11 +163,11 @@ impl Stub {
             .any(|n| n.iter().all(|x| *x == 0.0))
     }
 
-    /// Did the first number of the calls after so many lines take many values between zero and this one?
+    /// Did the first number of the calls after so many lines take some values between zero and this one?
     pub(crate) fn has_risen_slowly_to(&self, full: f64, from: usize, call: &str) -> bool {
         let calls = self.calls_from(from);
         let all = calls.iter().filter_map(|line| numbers(line, call));
-        all.filter(|n| n[0] > 0.0 && n[0] < full).count() >= 5
+        all.filter(|n| n[0] > 0.0 && n[0] < full).count() >= 2
     }
 
     /// Was the call before this place one with zeros alone?

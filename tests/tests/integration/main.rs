@@ -14,6 +14,7 @@ mod fast_path;
 mod friction;
 mod friction_wedge;
 mod interior;
+mod live;
 mod multiply;
 mod p_method;
 mod places;

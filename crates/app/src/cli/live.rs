@@ -98,6 +98,7 @@ pub(super) fn run(args: &LiveArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u
     devices.add_simulated(args, &loaded)?;
     devices.notes().for_each(|note| ui.note(note));
     let mut ready = Ready::new(args, loaded, devices.first()?)?;
+    ui.note(&format!("coupling {}", ready.coupling));
     ui.note(&ready.rates.words());
     let (report, logged) = feel(args, &mut ready, &mut devices, files.as_ref(), ui)?;
     ui.end_status();

@@ -66,6 +66,8 @@ pub struct LiveReport {
     pub servo: ServoReport,
     /// The felt curve.
     pub snap: SnapWatch,
+    /// N, the most that went to the device: less than the curve where the device cannot do more.
+    pub largest_rendered: f64,
     /// Periods that are not in the log because its writer was too slow.
     pub n_unlogged: u64,
     /// What two rates tell, if there were two.
@@ -179,6 +181,7 @@ pub fn run_on<'a, C: Clock>(
     Ok(LiveReport {
         servo: servo.report(),
         snap: session.course.ports.snap,
+        largest_rendered: session.course.ports.largest_rendered,
         n_unlogged: session.course.ports.n_unlogged,
         two_rates,
         second,

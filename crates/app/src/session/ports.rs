@@ -104,6 +104,8 @@ pub(super) struct Ports<'a> {
     /// The newest period.
     pub(super) viewer: Option<SnapshotInput>,
     pub(super) snap: SnapWatch,
+    /// N, the most that went to the device.
+    pub(super) largest_rendered: f64,
     pub(super) solved: Option<Pending>,
 }
 
@@ -164,6 +166,8 @@ impl<'a> Ports<'a> {
 
     /// The period is over. Nothing is told of one without a state of the handle.
     pub(super) fn over(&mut self, servo: &PeriodRecord) {
+        let rendered = servo.wrench_on_handle.force.length();
+        self.largest_rendered = self.largest_rendered.max(rendered);
         let Some(solved) = self.solved.take() else {
             return;
         };

@@ -244,8 +244,7 @@ pub(super) fn coupled(
     }
     let why = if coupling.translational_stiffness > allowed.translational {
         format!(
-            "the scene's; this device alone bears {} N/m: {}; leave it out of the scene where the device shakes",
-            short(allowed.translational),
+            "the scene's; leave it out where the device shakes, which alone bears {}",
             allowed.reason
         )
     } else if coupling.is_translational_given {

@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use super::super::json_text;
 use super::ready::Ready;
+use crate::report::plot::short;
 use crate::session::live::LiveReport;
 use crate::session::log::Logged;
 
@@ -24,21 +25,31 @@ impl Told<'_> {
     pub(super) fn text(&self) -> String {
         let (snap, servo) = (&self.report.snap, &self.report.servo);
         let us = |s: f64| 1e6 * s;
+        let coupling = &self.ready.scene.coupling;
+        let pulled = match snap.peak_retention {
+            0.0 => "nothing held it".to_owned(),
+            force => format!(
+                "{force:.3} N at {:.3} mm; came off {}",
+                1e3 * snap.travel_at_retention,
+                times(snap.n_snaps_out)
+            ),
+        };
         let mut text = format!(
-            "{}\n  device                {}\n  coupling              {}, in series with the contact\n  \
+            "{}\n  device                {}\n  coupling              {} N/m, {} N m/rad, in series with the contact\n  \
              going in              {:.3} N at {:.3} mm of travel; snapped in {}\n  \
-             pulling out           {:.3} N at {:.3} mm; came off {}\n  \
+             pulling out           {}\n  \
+             on the hand           {:.3} N at most\n  \
              loop                  {} periods of {} ms, {} missed ({} in a row at most), {} skipped\n  \
              response              median {:.1} us, 99 % below {:.1} us, longest {:.1} us; woken late by {:.1}, {:.1}, {:.1} us\n",
             self.ready.scene.title,
             self.devices,
-            self.ready.coupling,
+            short(coupling.translational_stiffness),
+            short(coupling.rotational_stiffness),
             snap.peak_force,
             1e3 * snap.travel_at_peak,
             times(snap.n_snaps_in),
-            snap.peak_retention,
-            1e3 * snap.travel_at_retention,
-            times(snap.n_snaps_out),
+            pulled,
+            self.report.largest_rendered,
             servo.periods,
             1e3 * self.ready.spec.session.period_s,
             servo.missed_deadlines,
@@ -79,11 +90,14 @@ impl Told<'_> {
             "title": self.ready.scene.title,
             "scene": self.ready.scene.path,
             "device": self.devices,
-            "coupling": self.ready.coupling,
+            "coupling_N_per_m": self.ready.scene.coupling.translational_stiffness,
+            "coupling_Nm_per_rad": self.ready.scene.coupling.rotational_stiffness,
+            "coupling_why": self.ready.coupling,
             "peak_insertion_force_N": snap.peak_force,
             "travel_at_peak_m": snap.travel_at_peak,
             "peak_retention_force_N": snap.peak_retention,
             "travel_at_retention_m": snap.travel_at_retention,
+            "largest_force_on_hand_N": self.report.largest_rendered,
             "snaps_in": snap.n_snaps_in,
             "snaps_out": snap.n_snaps_out,
             "period_s": self.ready.spec.session.period_s,

@@ -26,6 +26,7 @@ mod recording;
 pub mod slew;
 pub mod slow;
 mod snap;
+mod tangent;
 mod watch;
 
 use std::time::Instant;

@@ -76,6 +76,7 @@ impl Clip {
             mapping: None,
             clutch: 0,
             stretch_max: None,
+            stiffness: 2e4,
             n_periods: None,
             lever: 0.05,
             servo: ServoSettings::live(&limits).unwrap(),

@@ -47,10 +47,15 @@ pub(super) struct LiveArgs {
     )]
     second_axes: open::Axes,
     /// Forces sent to the device per second, 100 to 10000 (default: the scene's device.servo_period).
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     rate: Option<f64>,
     /// Metres in the scene per metre of the device; forces are scaled by the same factor.
-    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    #[arg(
+        long,
+        value_name = "FACTOR",
+        default_value_t = 1.0,
+        allow_negative_numbers = true
+    )]
     scale: f64,
     /// Button (1 is the first) that holds the clutch: the tool stays while the handle moves.
     #[arg(long, value_name = "BUTTON", value_parser = clap::value_parser!(u32).range(1..=32))]
@@ -65,10 +70,10 @@ pub(super) struct LiveArgs {
     )]
     axes: open::Axes,
     /// Largest force on the hand, N (default: what the device can).
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     max_force: Option<f64>,
     /// End after so many seconds (default: Ctrl-C, or the end of the scripted hand).
-    #[arg(long = "for", value_name = "SECONDS")]
+    #[arg(long = "for", value_name = "SECONDS", allow_negative_numbers = true)]
     seconds: Option<f64>,
     /// Folder for recordings (default: out/ and the scene's name with -live); nothing there is overwritten.
     #[arg(long, value_name = "DIR")]

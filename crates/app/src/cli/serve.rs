@@ -29,10 +29,20 @@ pub(super) struct ServeArgs {
     #[arg(long, value_name = "NAME", default_value = "Hand0")]
     name: String,
     /// Rest of the hand before each way in, s: time to connect.
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 10.0,
+        allow_negative_numbers = true
+    )]
     rest: f64,
     /// Periods per second, 100 to 10000.
-    #[arg(long, value_name = "HZ", default_value_t = 1000.0)]
+    #[arg(
+        long,
+        value_name = "HZ",
+        default_value_t = 1000.0,
+        allow_negative_numbers = true
+    )]
     rate: f64,
 }
 

@@ -169,7 +169,7 @@ pub struct Steps {
 /// # Errors
 /// Bytes that do not begin as a recording; a step that cannot be understood.
 pub fn read(bytes: &[u8]) -> Result<Steps, McapError> {
-    let is_whole = MessageStream::new(bytes).is_ok();
+    let is_whole = mcap::read::footer(bytes).is_ok();
     let mut found = Steps {
         messages: Vec::new(),
         is_whole,

@@ -68,7 +68,8 @@ pub fn z_width(
         let of = |value: &dyn Fn(&ZPoint) -> Option<f64>| -> Vec<(f64, f64)> {
             let points = width.points.iter();
             points
-                .filter_map(|p| value(p).map(|y| (p.virtual_damping, y.min(y1))))
+                .filter_map(|p| value(p).map(|y| (p.virtual_damping, y)))
+                .take_while(|(_, y)| *y <= y1)
                 .collect()
         };
         let critical = of(&|p| Some(p.critical));

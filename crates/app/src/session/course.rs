@@ -10,6 +10,7 @@ use super::drive::Drive;
 use super::fast::Tick;
 use super::other::Other;
 use super::ports::{Ports, Solved};
+use super::tangent::Tangent;
 use crate::engine::{ActiveContact, Stage, StepReport};
 
 /// What is moved, by whom, and who is told.
@@ -30,6 +31,8 @@ pub(super) struct Mapped {
     pub(super) clutch: u32,
     /// m, how far the handle may be ahead of a tool that is held up; `None` where the hand feels it.
     pub(super) stretch_max: Option<f64>,
+    /// How the force goes on, for a device with a loop of its own.
+    pub(super) tangent: Tangent,
 }
 
 impl Mapped {
@@ -106,7 +109,12 @@ impl Course<'_> {
                     Some(other) => other.first_body(&self.held, &handle.pose, &report),
                 };
                 mapped.hold_back(&handle.pose, &body);
-                mapped.mapping.to_device(&on_handle)
+                let force = on_handle.wrench.force;
+                let stiffness = mapped.tangent.follow(handle.pose.translation, force);
+                mapped.mapping.to_device(&Command {
+                    stiffness,
+                    ..on_handle
+                })
             }
         }
     }

@@ -11,6 +11,7 @@ use super::other::Other;
 pub use super::other::{SecondHand, SecondReport};
 use super::ports::{Ports, SnapshotInput};
 use super::rates::{ChosenRates, TwoRates, choose};
+use super::tangent::Tangent;
 use super::{Sample, Session, SessionSpec, SnapWatch, refuse_overlap};
 use crate::Error;
 use crate::engine::Engine;
@@ -35,6 +36,8 @@ pub struct LiveSpec {
     pub stretch_max: Option<f64>,
     /// Periods at most.
     pub n_periods: Option<u64>,
+    /// N/m, of the coupling along a way.
+    pub stiffness: f64,
     /// m, divides torques to compare them with forces.
     pub lever: f64,
     /// The loop and its guard.
@@ -152,6 +155,7 @@ pub fn run_on<'a, C: Clock>(
                 mapping,
                 clutch: spec.clutch,
                 stretch_max: spec.stretch_max,
+                tangent: Tangent::new(spec.stiffness),
             }),
             other: other.transpose()?,
             drive: Drive::Live {

@@ -105,6 +105,7 @@ impl Ready {
             mapping: first.mapping(args.axes, args.scale, session.held)?,
             clutch: args.clutch.map_or(0, |button| 1 << (button - 1)),
             stretch_max: None,
+            stiffness: scene.coupling.translational_stiffness,
             lever: part_extent(&prepared.loaded.mesh),
             servo: ServoSettings::live(&limits)?,
             session,

@@ -132,7 +132,7 @@ pub use hand::{Guide, HandSettings, SimulatedHand};
 pub use haptic_device::{Command, HandPresence, HandleState, HapticDevice, Limits, Readiness};
 pub use histogram::{TimeHistogram, TimeSummary};
 pub use mapping::{Mapping, MappingSettings, Rotation};
-pub use realtime::{Granted, Realtime};
+pub use realtime::{Granted, Realtime, priority_of_loop};
 pub use safety::{
     Arming, ArmingSettings, HeatingSettings, ObservedEnergy, PassivitySettings, PortSettings,
     Safety, SafetyEvents, SafetySettings, WaitsFor, Watchdog,

@@ -33,7 +33,7 @@ impl Realtime {
     #[must_use]
     pub fn ask() -> Self {
         Self {
-            priority: priority(),
+            priority: priority_of_loop(),
             memory: memory(),
         }
     }
@@ -66,7 +66,9 @@ fn has_cores() -> bool {
     std::thread::available_parallelism().is_ok_and(|n| n.get() > 1)
 }
 
-fn priority() -> Granted {
+/// Asks for real-time priority for the calling thread alone.
+#[must_use]
+pub fn priority_of_loop() -> Granted {
     if !has_cores() {
         return Granted::No {
             what: "no real-time priority: there is one core alone".to_owned(),

@@ -72,6 +72,8 @@ pub struct PeriodRecord {
     pub arming: Arming,
     /// Energy observed at the handle.
     pub energy: ObservedEnergy,
+    /// How often the guard has stepped in so far.
+    pub safety: SafetyEvents,
 }
 
 /// What came of a run.
@@ -228,6 +230,7 @@ impl<C: Clock> Servo<C> {
             skipped: release.skipped,
             arming: self.safety.arming(),
             energy: self.safety.energy(),
+            safety: self.safety.events(),
         };
         self.count(&record);
         self.count_failures(read.err(), written.err())?;

@@ -4,6 +4,8 @@ use std::io::Write;
 use std::time::{Duration, Instant};
 
 use clap::Args;
+use device::Granted;
+use device::driver;
 use gpu::{Adapter, Adapters, Gpu, GpuSettings, Layout};
 use serde_json::{Value, json};
 
@@ -43,7 +45,14 @@ impl Finding {
 }
 
 pub(super) fn run(args: &DoctorArgs, out: &mut dyn Write) -> Result<u8, Error> {
-    let mut findings = vec![processor(), memory(), clock(), cache_folder(), devices()];
+    let mut findings = vec![
+        processor(),
+        memory(),
+        clock(),
+        cache_folder(),
+        real_time(),
+        devices(),
+    ];
     let adapters = Adapters::find();
     findings.push(multiply(&adapters));
     findings.extend(adapters.list.iter().map(|one| adapter(one, &adapters)));
@@ -158,11 +167,35 @@ fn cache_folder() -> Finding {
     }
 }
 
+/// Simulated devices are always there.
 fn devices() -> Finding {
-    Finding::works(
-        "devices",
-        "simulated Virtuose 6D with a simulated hand (this version drives no hardware)".to_owned(),
-    )
+    let found: Vec<String> = driver::list()
+        .into_iter()
+        .filter(|one| one.status.is_ok() && !one.name.starts_with("simulated"))
+        .map(|one| one.name)
+        .collect();
+    let what = match found.as_slice() {
+        [] => "none is attached; `snapin devices` says what could be, and why not".to_owned(),
+        found => format!("{}; `snapin devices` tells more", found.join(", ")),
+    };
+    Finding::works("devices", format!("simulated ones; {what}"))
+}
+
+/// What a live session's loop would be granted.
+fn real_time() -> Finding {
+    // On a thread of its own: what it is granted must not outlive the question.
+    let granted = std::thread::spawn(device::priority_of_loop).join();
+    match granted {
+        Ok(Granted::Yes(what)) => Finding::works("real time", what),
+        Ok(Granted::No { what, mend }) => Finding {
+            subject: "real time",
+            works: false,
+            what,
+            mend: Some(mend),
+            numbers: Value::Null,
+        },
+        Err(_) => Finding::works("real time", "not known".to_owned()),
+    }
 }
 
 /// The processor multiplies in any case.

@@ -155,6 +155,7 @@ fn feel(
         view,
         shape: ready.shape.as_mut(),
         messages,
+        told: Vec::new(),
         ui,
     };
     let (stop, is_written) = (AtomicBool::new(false), AtomicBool::new(false));
@@ -218,6 +219,8 @@ struct Eye<'a, 'u> {
     view: SnapshotOutput,
     shape: Option<&'a mut Shape>,
     messages: Vec<&'a Receiver<String>>,
+    /// What the guard did and was told.
+    told: Vec<&'static str>,
     ui: &'a Ui<'u>,
 }
 
@@ -230,6 +233,10 @@ impl Eye<'_, '_> {
             self.tell();
             if self.view.update() {
                 let snapshot = self.view.output_buffer();
+                if let Some(sample) = &snapshot.sample {
+                    let news = told::news(&sample.servo.safety, &mut self.told);
+                    news.for_each(|news| self.ui.note(&news));
+                }
                 if let (Some(shape), Some(sample)) = (&mut self.shape, &snapshot.sample) {
                     // What cannot be drawn is not fetched ahead; the step says so itself.
                     let _ = shape.update(snapshot.contacts());

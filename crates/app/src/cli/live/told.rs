@@ -147,6 +147,25 @@ fn guard_json(events: &SafetyEvents) -> Value {
     Value::Object(named.collect())
 }
 
+/// What the guard did for the first time and the user should know at once: samples that cannot be, and forces that were
+/// cut. `told`: what has been said.
+pub(super) fn news(
+    events: &SafetyEvents,
+    told: &mut Vec<&'static str>,
+) -> impl Iterator<Item = String> {
+    let is_news = |what: &str| {
+        what.starts_with("cut") || what.starts_with("samples") || what.contains("not finite")
+    };
+    let new: Vec<&'static str> = guard(events)
+        .into_iter()
+        .filter(|(what, n)| *n > 0 && is_news(what) && !told.contains(what))
+        .map(|(what, _)| what)
+        .collect();
+    told.extend(&new);
+    new.into_iter()
+        .map(|what| format!("guard: {what} (said once; how often is told at the end)"))
+}
+
 /// What the guard counts, in words.
 fn guard(events: &SafetyEvents) -> Vec<(&'static str, u64)> {
     vec![

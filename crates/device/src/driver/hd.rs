@@ -15,7 +15,6 @@ mod api;
 mod frame;
 mod limits;
 mod stylus;
-mod turn;
 
 use api::{Device, Failure, Functions, number};
 

@@ -14,7 +14,6 @@ use triple_buffer::{Input, Output, triple_buffer};
 use super::api::{Device, number};
 use super::frame::{ARGUMENTS, DEVICE, FORCE, Frames, Seen, Wanted, frame};
 use super::limits::Stated;
-use super::turn::Turn;
 use crate::driver::library::Lease;
 use crate::driver::library::guard::{
     AT_REST, Gate, Notices, REST_S, allowed, nonsense, sound_frame,
@@ -23,6 +22,7 @@ use crate::driver::link::{Connected, STALE_S};
 use crate::driver::{Identity, Link, Unavailable};
 use crate::error::DeviceError;
 use crate::haptic_device::{Command, HandPresence, HandleState, Limits, Readiness};
+use crate::velocity::VelocityEstimator;
 use crate::wrench::Wrench;
 
 /// Longest wait for a frame in one exchange.
@@ -91,7 +91,8 @@ pub(super) fn start(device: Device, lease: Lease, version: &str) -> Result<Conne
         },
         heard_at: Instant::now(),
         tripped: None,
-        turn: Turn::default(),
+        begun: Instant::now(),
+        velocity: VelocityEstimator::default(),
     };
     if let Some(code) = started.first() {
         stylus.close();
@@ -208,7 +209,9 @@ struct Stylus {
     heard_at: Instant,
     /// When and why the library cut the force.
     tripped: Option<(Instant, &'static str)>,
-    turn: Turn,
+    begun: Instant,
+    /// For turns: what the library says of them comes in axes that are not stated.
+    velocity: VelocityEstimator,
 }
 
 impl Stylus {
@@ -263,10 +266,12 @@ impl Stylus {
         let column = |i: usize| DVec3::new(m[i], m[i + 1], m[i + 2]);
         let axes = DMat3::from_cols(column(0), column(4), column(8));
         let pose = sound_frame(column(12) * 1e-3, axes)?;
+        let at_s = seen.at?.saturating_duration_since(self.begun).as_secs_f64();
+        let (_, angular_velocity) = self.velocity.update(&pose, at_s);
         Some(HandleState {
             pose,
             linear_velocity: DVec3::from_array(seen.velocity) * 1e-3,
-            angular_velocity: self.turn.follow(seen.at?, pose.rotation),
+            angular_velocity,
             time_s: 0.0,
             buttons: seen.buttons,
             hand: if seen.is_in_inkwell {

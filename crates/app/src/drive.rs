@@ -337,7 +337,7 @@ impl Drive<'_> {
         self.engine.reset();
         let n = way.inwards.len() + way.outwards.len() + 1;
         let mut gone = Gone {
-            recording: Recording::with_room(self.spec.direction, n, ChosenRates::driven()),
+            recording: Recording::with_room(self.spec.direction, (n, 64), ChosenRates::driven()),
             asked: Vec::with_capacity(n),
             stored: Vec::with_capacity(n),
             stopped_at: None,

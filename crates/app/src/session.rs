@@ -126,7 +126,8 @@ pub fn run(
         n_ticks: n_periods as usize,
     };
     let settings = ServoSettings::for_limits(HapticDevice::limits(&device));
-    let mut recording = Recording::with_room(spec.direction, n_periods as usize, rates);
+    let room = (n_periods as usize, engine.settings().max_contacts);
+    let mut recording = Recording::with_room(spec.direction, room, rates);
     let mut session = Session {
         device: &mut device,
         course: Course {

@@ -8,14 +8,16 @@ use std::time::Duration;
 
 use device::driver::vrpn::server::Server;
 use device::{
-    Command, DeviceError, HandleState, HapticDevice, Insertion, Limits, Mapping, MappingSettings,
-    Script, ServoSettings, Simulated, SimulatedHand, SimulatedSettings,
+    Command, DeviceError, HandSettings, HandleState, HapticDevice, Insertion, Limits, Mapping,
+    MappingSettings, SafetySettings, Script, ServoSettings, Simulated, SimulatedHand,
+    SimulatedSettings,
 };
+use glam::DVec3;
 use glamx::DPose3;
 use snapin::engine::Engine;
 use snapin::prepare::PreparedPart;
 use snapin::report::mcap_file::{self, StepMessage};
-use snapin::session::live::{self, Hands, LivePorts, LiveReport, LiveSpec};
+use snapin::session::live::{self, Hands, LivePorts, LiveReport, LiveSpec, SecondHand};
 use snapin::session::log::Log;
 use snapin::session::rates::Rates;
 use snapin::session::{SnapshotOutput, snapshots};
@@ -113,6 +115,19 @@ impl Clip {
         &mut self,
         device: &mut dyn HapticDevice,
         file: &Path,
+        is_over: impl FnMut(&mut SnapshotOutput) -> bool,
+    ) -> (LiveReport, Vec<StepMessage>) {
+        let hands = Hands {
+            first: device,
+            second: None,
+        };
+        self.feel_with(hands, file, is_over)
+    }
+
+    fn feel_with(
+        &mut self,
+        hands: Hands<'_>,
+        file: &Path,
         mut is_over: impl FnMut(&mut SnapshotOutput) -> bool,
     ) -> (LiveReport, Vec<StepMessage>) {
         let rates = live::rates(&self.spec.session, &self.prepared, &mut self.engine).unwrap();
@@ -122,10 +137,6 @@ impl Clip {
             at_start: None,
             viewer,
             log: Some(samples),
-        };
-        let hands = Hands {
-            first: device,
-            second: None,
         };
         let (stop, is_written) = (AtomicBool::new(false), AtomicBool::new(false));
         let (spec, engine) = (&self.spec, &mut self.engine);
@@ -300,4 +311,131 @@ fn serve_again(address: SocketAddr, restarted: &AtomicU64, stop: &AtomicBool) {
         std::thread::sleep(Duration::from_millis(50));
     }
     panic!("the port did not come back");
+}
+
+/// A handle that goes on at a speed whatever stands in its way, as that of a SpaceMouse does.
+struct Pusher {
+    limits: Limits,
+    velocity: DVec3,
+    way: f64,
+}
+
+impl HapticDevice for Pusher {
+    fn name(&self) -> &str {
+        "pusher"
+    }
+
+    fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    fn read(&mut self, time_s: f64) -> Result<HandleState, DeviceError> {
+        let gone = (time_s * self.velocity).clamp_length_max(self.way);
+        Ok(HandleState {
+            time_s,
+            ..HandleState::at_rest(DPose3::from_translation(gone))
+        })
+    }
+
+    fn write(&mut self, command: &Command) -> Result<(), DeviceError> {
+        assert_eq!(command.wrench.force, DVec3::ZERO, "it renders none");
+        Ok(())
+    }
+
+    fn stop(&mut self) {}
+}
+
+/// Nothing holds such a handle back, so it slips: it is never further ahead than it may be, and the clip snaps on with
+/// the force that it has.
+#[test]
+fn a_handle_that_nothing_holds_back_slips_and_the_clip_snaps_on() {
+    const AHEAD: f64 = 1.5e-3;
+    let folder = tempfile::tempdir().unwrap();
+    let mut clip = Clip::new();
+    let session = &clip.spec.session;
+    let travel = session.travel;
+    let limits = Limits {
+        peak_force: 0.0,
+        continuous_force: 0.0,
+        peak_torque: 0.0,
+        ..Limits::virtuose_6d()
+    };
+    let speed = 0.02;
+    let mut device = Pusher {
+        limits,
+        velocity: speed * session.direction,
+        way: travel + 5e-3,
+    };
+    let mapping = Mapping::new(MappingSettings::default(), session.held.start()).unwrap();
+    let start = session.held.start().translation;
+    let direction = session.direction;
+    clip.spec.mapping = Some(mapping);
+    clip.spec.servo = ServoSettings::live(&limits).unwrap();
+    clip.spec.stretch_max = Some(AHEAD);
+    let file = folder.path().join("pushed.mcap");
+    let (report, steps) = clip.feel(&mut device, &file, |view| has_arrived(view, travel));
+    assert_eq!(report.snap.n_snaps_in, 1, "{:?}", report.snap);
+    assert_eq!(report.largest_rendered, 0.0);
+    // The clip's own peak without friction (the part's curve: 8.44 N).
+    let peak = report.snap.peak_force;
+    assert!((peak / 8.44 - 1.0).abs() < 0.01, "{peak} N");
+    let mut largest = 0.0_f64;
+    for step in &steps {
+        let handle = DVec3::from_array(step.handle_position_m.map(Option::unwrap));
+        largest = largest.max((handle - start).dot(direction) - step.travel_m);
+    }
+    // And what it goes in the periods that a loaded machine skips.
+    assert!(largest > 2e-4, "it was ahead of the tool: {largest} m");
+    assert!(largest < AHEAD + 1e-3, "{largest} m");
+}
+
+/// Two hands: one brings the tool, the other holds the part and gives way; both feel the same.
+#[test]
+fn the_other_hand_holds_the_part_and_gives_way() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut clip = Clip::new();
+    let travel = clip.spec.session.travel;
+    let begun = AtomicBool::new(true);
+    let mut first = clip.hand(&begun);
+    let (scene, _) = shipped("clip.toml");
+    let (tool, _) = setup::tool(&scene).unwrap();
+    let mesh = &clip.prepared.loaded.mesh;
+    let held = clip.spec.session.held.other(&tool, mesh);
+    // A grip of 2 kN/m, so that under 8 N it gives way by 4 mm.
+    let hand = SimulatedHand::resting(Default::default(), held.start(), 1e-3).unwrap();
+    let mut second = Simulated::new(SimulatedSettings::default(), hand).unwrap();
+    let hands = Hands {
+        first: &mut first,
+        second: Some(SecondHand {
+            device: &mut second,
+            held,
+            mapping: None,
+            safety: SafetySettings::live(&Limits::virtuose_6d()).unwrap(),
+        }),
+    };
+    let file = folder.path().join("two.mcap");
+    let (report, steps) = clip.feel_with(hands, &file, |view| {
+        view.update();
+        let seen = view.output_buffer();
+        let snapped = seen.snap.n_snaps_in > 0;
+        snapped && seen.sample.is_some_and(|s| s.gone.travel > 0.9 * travel)
+    });
+    let guard = report.second.unwrap();
+    assert_eq!(guard.failures, 0);
+    let peak = report.snap.peak_force;
+    assert!((peak / 8.44 - 1.0).abs() < 0.02, "{peak} N");
+    // Where the force is largest the first handle is ahead of the tool's travel by coupling and the other hand.
+    let start = clip.spec.session.held.start().translation;
+    let direction = clip.spec.session.direction;
+    let ahead = |step: &StepMessage| {
+        let handle = DVec3::from_array(step.handle_position_m.map(Option::unwrap));
+        (handle - start).dot(direction) - step.travel_m
+    };
+    let at_peak = (steps.iter()).max_by(|a, b| a.force_n.partial_cmp(&b.force_n).unwrap());
+    let gave_way = ahead(at_peak.unwrap()) - peak / 2e4;
+    let expected = peak / HandSettings::default().grip_stiffness;
+    assert!(
+        (gave_way / expected - 1.0).abs() < 0.1,
+        "{gave_way} and {expected} m"
+    );
 }

@@ -113,10 +113,10 @@ pub fn largest_force(spec: &SessionSpec, engine: &mut Engine) -> f64 {
 ///
 /// # Errors
 /// Settings that the loop refuses; an engine that ended on its own beside the loop.
-pub fn run<'a>(
+pub fn run<'a, 'h: 'a>(
     spec: &LiveSpec,
     rates: &ChosenRates,
-    hands: Hands<'a>,
+    hands: Hands<'h>,
     engine: &mut Engine,
     ports: LivePorts<'a>,
     stop: &'a AtomicBool,
@@ -129,11 +129,11 @@ pub fn run<'a>(
 ///
 /// # Errors
 /// As [`run`].
-pub fn run_on<'a, C: Clock>(
+pub fn run_on<'a, 'h: 'a, C: Clock>(
     clock: C,
     spec: &LiveSpec,
     rates: &ChosenRates,
-    hands: Hands<'a>,
+    hands: Hands<'h>,
     engine: &mut Engine,
     ports: LivePorts<'a>,
     stop: &'a AtomicBool,
@@ -145,7 +145,11 @@ pub fn run_on<'a, C: Clock>(
         n_ticks: KEPT_TICKS,
     };
     let mut servo = Servo::new(clock, spec.servo)?;
-    let second = hands.second;
+    let second = hands.second.map(|hand| SecondHand {
+        // Borrowed for no longer than the session.
+        device: hand.device,
+        ..hand
+    });
     let other = second.map(|hand| Other::new(hand, spec.session.period_s));
     let mut session = Session {
         device: hands.first,

@@ -71,8 +71,14 @@ pub(crate) struct Entry {
 }
 
 impl Recording {
-    /// An empty one with memory for so many records. `direction`: of any length but zero.
-    pub(crate) fn with_room(direction: DVec3, n_records: usize, rates: ChosenRates) -> Self {
+    /// An empty one with memory for so many records, and contacts in each. `direction`: of any length but zero.
+    pub(crate) fn with_room(
+        direction: DVec3,
+        (n_records, n_contacts): (usize, usize),
+        rates: ChosenRates,
+    ) -> Self {
+        /// Contacts in all: the system gives memory as it is written to, and no scene comes near.
+        const MOST: usize = 1 << 22;
         Self {
             records: Vec::with_capacity(n_records),
             direction: direction.normalize(),
@@ -81,7 +87,7 @@ impl Recording {
             max_surface_displacement: 0.0,
             rates,
             two_rates: None,
-            contacts: Vec::with_capacity(64 * n_records),
+            contacts: Vec::with_capacity(MOST.min(n_contacts.saturating_mul(n_records))),
         }
     }
 

@@ -89,7 +89,7 @@ fn run_with(
     let settings = ServoSettings::for_limits(HapticDevice::limits(&device));
     let mut servo = Servo::new(AsFastAsPossible::new(1e-3).unwrap(), settings).unwrap();
     let rates = choose(&spec, engine);
-    let mut recording = Recording::with_room(spec.direction, N_PERIODS as usize, rates);
+    let mut recording = Recording::with_room(spec.direction, (N_PERIODS as usize, 4), rates);
     let mut session = Session {
         device: &mut device,
         course: Course {

@@ -258,9 +258,11 @@ fn no_period_of_a_live_session_allocates() {
         let spec = LiveSpec {
             mapping: Some(Mapping::new(MappingSettings::default(), held.start()).unwrap()),
             clutch: 0,
-            stretch_max: None,
+            slips: false,
+            largest_force: 14.0,
             stiffness: 2e4,
             n_periods: Some(n_periods),
+            seconds: None,
             lever: 0.05,
             servo: ServoSettings::live(&limits).unwrap(),
             session,

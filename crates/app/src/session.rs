@@ -23,6 +23,7 @@ mod overlap;
 mod ports;
 pub mod rates;
 mod recording;
+mod saturation;
 pub mod slew;
 pub mod slow;
 mod snap;
@@ -54,7 +55,7 @@ use rates::{Rates, TwoRates, choose};
 pub(crate) use recording::Entry;
 pub use recording::{Record, Recording};
 use slow::{SlowStep, Stepped};
-pub use snap::SnapWatch;
+pub use snap::{SnapPeak, SnapWatch};
 
 /// Servo periods between two evaluations of the whole surface: 60 Hz at 1 kHz.
 const DISPLAY_INTERVAL: u64 = 16;
@@ -134,6 +135,7 @@ pub fn run(
             held: spec.held,
             mapped: None,
             other: None,
+            saturation: None,
             drive: Drive::Scripted { script, n_periods },
             ports: Ports::recording(&mut recording),
         },

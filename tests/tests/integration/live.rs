@@ -77,9 +77,11 @@ impl Clip {
         let spec = LiveSpec {
             mapping: None,
             clutch: 0,
-            stretch_max: None,
+            slips: false,
+            largest_force: 14.0,
             stiffness: 2e4,
             n_periods: None,
+            seconds: None,
             lever: 0.05,
             servo: ServoSettings::live(&limits).unwrap(),
             session,
@@ -349,7 +351,8 @@ impl HapticDevice for Pusher {
 /// the force that it has.
 #[test]
 fn a_handle_that_nothing_holds_back_slips_and_the_clip_snaps_on() {
-    const AHEAD: f64 = 1.5e-3;
+    // 1.5 times 14 N at 20 kN/m.
+    const AHEAD: f64 = 1.05e-3;
     let folder = tempfile::tempdir().unwrap();
     let mut clip = Clip::new();
     let session = &clip.spec.session;
@@ -371,7 +374,7 @@ fn a_handle_that_nothing_holds_back_slips_and_the_clip_snaps_on() {
     let direction = session.direction;
     clip.spec.mapping = Some(mapping);
     clip.spec.servo = ServoSettings::live(&limits).unwrap();
-    clip.spec.stretch_max = Some(AHEAD);
+    clip.spec.slips = true;
     let file = folder.path().join("pushed.mcap");
     let (report, steps) = clip.feel(&mut device, &file, |view| has_arrived(view, travel));
     assert_eq!(report.snap.n_snaps_in, 1, "{:?}", report.snap);

@@ -114,11 +114,15 @@ pub(super) fn run(args: &LiveArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u
         logged: logged.as_ref(),
         recording: files.as_ref().map(|files| files.recording.as_path()),
     };
-    if let Some(files) = &files {
-        std::fs::write(&files.summary, told.json())
-            .map_err(Error::io(&files.summary, "write the summary"))?;
-    }
+    told.warnings().iter().for_each(|line| ui.note(line));
     print(out, &if args.json { told.json() } else { told.text() })?;
+    if let Some(files) = &files
+        && let Err(e) = std::fs::write(&files.summary, told.json())
+    {
+        // Half a summary is none.
+        let _ = std::fs::remove_file(&files.summary);
+        return Err(Error::io(&files.summary, "write the summary")(e));
+    }
     Ok(0)
 }
 
@@ -190,8 +194,10 @@ struct Files {
 }
 
 impl Files {
+    /// The recording is made here, so that two sessions that begin together do not share a number.
+    ///
     /// # Errors
-    /// A folder that cannot be made.
+    /// A folder or file that cannot be made.
     fn new(args: &LiveArgs) -> Result<Option<Self>, Error> {
         if args.no_recording {
             return Ok(None);
@@ -205,12 +211,33 @@ impl Files {
             &folder,
             "create the folder for recordings (name another with --out)",
         ))?;
-        let free = (1_u32..).find_map(|n| {
+        for n in 1_u32.. {
             let recording = folder.join(format!("session-{n:03}.mcap"));
             let summary = folder.join(format!("session-{n:03}.json"));
-            (!recording.exists() && !summary.exists()).then_some(Self { recording, summary })
-        });
-        Ok(free)
+            if summary.exists() {
+                continue;
+            }
+            match std::fs::File::create_new(&recording) {
+                Ok(_) => return Ok(Some(Self { recording, summary })),
+                Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {}
+                Err(e) => return Err(Error::io(&recording, "create the recording")(e)),
+            }
+        }
+        Ok(None)
+    }
+
+    /// Takes back what is not used.
+    fn forget(&self) {
+        let is_empty = std::fs::metadata(&self.recording).is_ok_and(|m| m.len() == 0);
+        if is_empty {
+            let _ = std::fs::remove_file(&self.recording);
+        }
+    }
+}
+
+impl Drop for Files {
+    fn drop(&mut self) {
+        self.forget();
     }
 }
 

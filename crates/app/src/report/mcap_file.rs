@@ -1,5 +1,7 @@
 //! `session.mcap`: every step on one time line, for players of recorded robot data.
 
+mod whole;
+
 use std::collections::BTreeMap;
 use std::io::{Cursor, Seek, Write};
 
@@ -9,6 +11,7 @@ use mcap::{McapError, MessageStream, WriteOptions, Writer};
 use serde::{Deserialize, Serialize};
 
 use super::data::{Run, StepRow};
+pub use whole::WholeFile;
 
 /// The channel that carries the steps.
 pub const STEP_TOPIC: &str = "/step";
@@ -30,6 +33,12 @@ pub struct StepMessage {
     pub force_on_handle_n: [Option<f64>; 3],
     /// Torque on the handle about its point, world, N m.
     pub torque_on_handle_nm: [Option<f64>; 3],
+    /// Force that went to the device, in the device's axes, N; `null` where there was none.
+    #[serde(default)]
+    pub sent_force_n: Option<[f64; 3]>,
+    /// Whether force was on: not before it is armed. `null` in scripted sessions.
+    #[serde(default)]
+    pub armed: Option<bool>,
     /// Position of the handle, world, m.
     pub handle_position_m: [Option<f64>; 3],
     /// Orientation of the handle, world: x, y, z, w.
@@ -57,6 +66,8 @@ impl StepMessage {
             force_n: finite(row.force_n),
             force_on_handle_n: numbers(row.force_on_handle.to_array()),
             torque_on_handle_nm: numbers(row.torque_on_handle.to_array()),
+            sent_force_n: None,
+            armed: None,
             handle_position_m: numbers(row.handle_pose.translation.to_array()),
             handle_rotation: numbers(row.handle_pose.rotation.to_array()),
             tool_position_m: numbers(row.tool_pose.translation.to_array()),
@@ -169,7 +180,8 @@ pub struct Steps {
 /// # Errors
 /// Bytes that do not begin as a recording; a step that cannot be understood.
 pub fn read(bytes: &[u8]) -> Result<Steps, McapError> {
-    let is_whole = mcap::read::footer(bytes).is_ok();
+    // A recording that was not ended has an end without a summary, or none.
+    let is_whole = mcap::read::footer(bytes).is_ok_and(|end| end.summary_start != 0);
     let mut found = Steps {
         messages: Vec::new(),
         is_whole,
@@ -212,6 +224,8 @@ fn schema() -> String {
             "force_n": number(),
             "force_on_handle_n": vector(),
             "torque_on_handle_nm": vector(),
+            "sent_force_n": {"type": ["array", "null"], "items": {"type": "number"}},
+            "armed": {"type": ["boolean", "null"]},
             "handle_position_m": vector(),
             "handle_rotation": rotation(),
             "tool_position_m": vector(),
@@ -294,6 +308,34 @@ mod tests {
             last = found.messages.len();
         }
         assert_eq!(last, run.rows.len());
+    }
+
+    /// Players that ask for an end find one after each flush, and what was flushed before it.
+    #[test]
+    fn a_file_is_a_recording_after_each_flush_and_ended_at_the_end() {
+        let run = sample::run();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("steps.mcap");
+        let file = WholeFile::new(std::fs::File::create(&path).unwrap());
+        let mut steps = StepWriter::new(file, &BTreeMap::new()).unwrap();
+        for (k, row) in run.rows.iter().enumerate() {
+            steps.push(&StepMessage::of(row)).unwrap();
+            if k % 10 == 9 {
+                steps.flush().unwrap();
+                let bytes = std::fs::read(&path).unwrap();
+                assert!(mcap::read::footer(&bytes).is_ok());
+                let strict = MessageStream::new(&bytes).unwrap();
+                assert_eq!(strict.map(Result::unwrap).count(), k + 1);
+                assert!(!read(&bytes).unwrap().is_whole);
+            }
+        }
+        steps.finish().unwrap().finish().unwrap();
+        let all = read(&std::fs::read(&path).unwrap()).unwrap();
+        assert!(all.is_whole);
+        assert_eq!(all.messages.len(), run.rows.len());
+        // What the program writes at once and what it writes step by step is the same.
+        let at_once = read(&session(&run).unwrap()).unwrap();
+        assert_eq!(at_once.messages, all.messages);
     }
 
     #[test]

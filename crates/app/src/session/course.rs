@@ -10,6 +10,7 @@ use super::drive::Drive;
 use super::fast::Tick;
 use super::other::Other;
 use super::ports::{Ports, Solved};
+use super::saturation::Saturation;
 use super::tangent::Tangent;
 use crate::engine::{ActiveContact, Stage, StepReport};
 
@@ -20,6 +21,8 @@ pub(super) struct Course<'a> {
     pub(super) mapped: Option<Mapped>,
     /// The device that holds the other body, if there is one.
     pub(super) other: Option<Other<'a>>,
+    /// The most that the hand can ask for; `None`: whatever its script says.
+    pub(super) saturation: Option<Saturation>,
     pub(super) drive: Drive<'a>,
     pub(super) ports: Ports<'a>,
 }
@@ -29,36 +32,29 @@ pub(super) struct Mapped {
     pub(super) mapping: Mapping,
     /// Buttons of which each holds the clutch.
     pub(super) clutch: u32,
-    /// m, how far the handle may be ahead of a tool that is held up; `None` where the hand feels it.
-    pub(super) stretch_max: Option<f64>,
+    /// Whether nothing holds its handle back, so that the handle is taken back instead.
+    pub(super) slips: bool,
     /// How the force goes on, for a device with a loop of its own.
     pub(super) tangent: Tangent,
 }
 
-impl Mapped {
-    /// Takes a handle that nothing holds back to where the tool leaves it. `body`: the held body's grip, world.
-    fn hold_back(&mut self, handle: &DPose3, body: &DPose3) {
-        let ahead = handle.translation - body.translation;
-        let stretch = ahead.length();
-        if let Some(most) = self.stretch_max.filter(|most| stretch > *most) {
-            self.mapping.slip(ahead * (most / stretch - 1.0));
-        }
-    }
-}
-
 impl Course<'_> {
-    /// A handle in the world. Once a period.
+    /// A handle in the world, no further than it may ask for. Once a period.
     pub(super) fn in_world(&mut self, handle: &HandleState) -> HandleState {
         if let Some(other) = &mut self.other {
             other.read(handle.time_s);
         }
-        match &mut self.mapped {
+        let mut handle = match &mut self.mapped {
             None => *handle,
             Some(mapped) => {
                 let is_clutched = handle.buttons & mapped.clutch != 0;
                 mapped.mapping.to_world(handle, is_clutched)
             }
+        };
+        if let Some(saturation) = &self.saturation {
+            handle.pose.translation -= saturation.excess();
         }
+        handle
     }
 
     /// Pose of the tool that a handle in the world asks for, in the part's frame.
@@ -101,22 +97,25 @@ impl Course<'_> {
             other.write(&self.held, &handle.pose, &report);
         }
         let on_handle = Command::from(answer.wrench_on_handle);
-        match &mut self.mapped {
-            None => on_handle,
-            Some(mapped) => {
-                let body = match &self.other {
-                    None => self.held.pose(&report.tool_pose),
-                    Some(other) => other.first_body(&self.held, &handle.pose, &report),
-                };
-                mapped.hold_back(&handle.pose, &body);
-                let force = on_handle.wrench.force;
-                let stiffness = mapped.tangent.follow(handle.pose.translation, force);
-                mapped.mapping.to_device(&Command {
-                    stiffness,
-                    ..on_handle
-                })
-            }
+        if let Some(saturation) = &mut self.saturation {
+            let place = handle.pose.translation + saturation.excess();
+            saturation.follow(place, on_handle.wrench.force);
         }
+        let Some(mapped) = &mut self.mapped else {
+            return on_handle;
+        };
+        if let Some(saturation) = &mut self.saturation
+            && mapped.slips
+        {
+            mapped.mapping.slip(-saturation.excess());
+            saturation.forget();
+        }
+        let force = on_handle.wrench.force;
+        let stiffness = mapped.tangent.follow(handle.pose.translation, force);
+        mapped.mapping.to_device(&Command {
+            stiffness,
+            ..on_handle
+        })
     }
 }
 

@@ -1,6 +1,7 @@
 //! What moves the handle, and until when.
 
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 use device::{Phase, Script};
 
@@ -25,6 +26,8 @@ pub(super) enum Drive<'a> {
         stop: &'a AtomicBool,
         /// Its length at most.
         n_periods: Option<u64>,
+        /// When it ends at the latest.
+        until: Option<Instant>,
         /// Which way it goes.
         heading: Heading,
     },
@@ -77,10 +80,14 @@ impl Drive<'_> {
                 Ok(period < *n_periods)
             }
             Self::Live {
-                stop, n_periods, ..
+                stop,
+                n_periods,
+                until,
+                ..
             } => {
                 let is_told = stop.load(Ordering::Relaxed) || interrupt::is_requested();
-                Ok(!is_told && n_periods.is_none_or(|n| period < n))
+                let is_late = until.is_some_and(|until| Instant::now() >= until);
+                Ok(!is_told && !is_late && n_periods.is_none_or(|n| period < n))
             }
         }
     }

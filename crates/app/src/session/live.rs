@@ -1,6 +1,7 @@
 //! A session with a hand that nobody wrote a script for: it goes on until it is told to end.
 
 use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
 
 use device::{Clock, HapticDevice, Mapping, RealTime, Servo, ServoReport, ServoSettings};
 
@@ -9,8 +10,10 @@ use super::drive::{Drive, Heading};
 use super::fast::FastSettings;
 use super::other::Other;
 pub use super::other::{SecondHand, SecondReport};
+pub use super::ports::ForceOn;
 use super::ports::{Ports, SnapshotInput};
 use super::rates::{ChosenRates, TwoRates, choose};
+use super::saturation::Saturation;
 use super::tangent::Tangent;
 use super::{Sample, Session, SessionSpec, SnapWatch, refuse_overlap};
 use crate::Error;
@@ -32,10 +35,15 @@ pub struct LiveSpec {
     pub mapping: Option<Mapping>,
     /// Buttons of which each holds the clutch.
     pub clutch: u32,
-    /// m, how far the handle may be ahead of a tool that is held up; `None` where the hand feels it.
-    pub stretch_max: Option<f64>,
-    /// Periods at most.
+    /// Whether nothing holds its handle back, so that the handle is taken back instead.
+    pub slips: bool,
+    /// N, largest force on the scene's own way ([`largest_force`]): a hand is given one and a half times as much, 2 N at
+    /// least, and presses in vain beyond.
+    pub largest_force: f64,
+    /// Periods at most, where a script knows.
     pub n_periods: Option<u64>,
+    /// s by the clock at most.
+    pub seconds: Option<f64>,
     /// N/m, of the coupling along a way.
     pub stiffness: f64,
     /// m, divides torques to compare them with forces.
@@ -71,6 +79,8 @@ pub struct LiveReport {
     pub snap: SnapWatch,
     /// N, the most that went to the device: less than the curve where the device cannot do more.
     pub largest_rendered: f64,
+    /// Whether the hand was given force at all.
+    pub force: ForceOn,
     /// Periods that are not in the log because its writer was too slow.
     pub n_unlogged: u64,
     /// What two rates tell, if there were two.
@@ -158,19 +168,24 @@ pub fn run_on<'a, 'h: 'a, C: Clock>(
             mapped: spec.mapping.clone().map(|mapping| Mapped {
                 mapping,
                 clutch: spec.clutch,
-                stretch_max: spec.stretch_max,
+                slips: spec.slips,
                 tangent: Tangent::new(spec.stiffness),
             }),
             other: other.transpose()?,
+            saturation: Some(Saturation::new(spec.largest_force, spec.stiffness)),
             drive: Drive::Live {
                 stop,
                 n_periods: spec.n_periods,
+                until: spec
+                    .seconds
+                    .map(|s| Instant::now() + Duration::from_secs_f64(s)),
                 heading: Heading::new(),
             },
             ports: Ports {
                 direction: spec.session.direction.normalize(),
                 viewer: Some(ports.viewer),
                 log: ports.log,
+                clock_period_s: Some(spec.session.period_s),
                 ..Ports::default()
             },
         },
@@ -189,6 +204,7 @@ pub fn run_on<'a, 'h: 'a, C: Clock>(
     Ok(LiveReport {
         servo: servo.report(),
         snap: session.course.ports.snap,
+        force: session.course.ports.force,
         largest_rendered: session.course.ports.largest_rendered,
         n_unlogged: session.course.ports.n_unlogged,
         two_rates,

@@ -1,16 +1,15 @@
 //! Every period into a file while the session goes on: a ring to a thread that writes.
 //!
 //! The loop pushes samples of fixed size into a ring of fixed length and never waits. Should the program be killed,
-//! the file holds all but the last quarter of a second.
+//! the file is a recording all the same, of all but the last quarter of a second.
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use device::Phase;
+use device::{Arming, Phase};
 use glam::DVec3;
 use mcap::McapError;
 use rtrb::{Consumer, Producer, RingBuffer};
@@ -18,7 +17,7 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use super::Sample;
 use crate::Error;
 use crate::report;
-use crate::report::mcap_file::{StepMessage, StepWriter, finite, numbers};
+use crate::report::mcap_file::{StepMessage, StepWriter, WholeFile, finite, numbers};
 
 /// Samples in the ring: eight seconds at 1 kHz for a disk that is busy.
 const ROOM: usize = 8192;
@@ -32,7 +31,7 @@ const LOOK_S: f64 = 0.02;
 /// The writer's end.
 pub struct Log {
     path: PathBuf,
-    steps: StepWriter<BufWriter<File>>,
+    steps: StepWriter<WholeFile>,
     samples: Consumer<Sample>,
 }
 
@@ -44,7 +43,7 @@ pub struct Logged {
 }
 
 impl Log {
-    /// Begins a file that must not exist yet; with the loop's end of the ring. `about`: what the recording is of.
+    /// Begins a file, which is empty or not there yet; with the loop's end of the ring. `about`: what the recording is of.
     ///
     /// # Errors
     /// A file that cannot be created.
@@ -52,9 +51,11 @@ impl Log {
         path: &Path,
         about: &BTreeMap<String, String>,
     ) -> Result<(Self, Producer<Sample>), Error> {
-        let file = File::create_new(path).map_err(Error::io(path, "create the recording"))?;
+        let mut options = File::options();
+        let opened = options.write(true).create(true).truncate(false).open(path);
+        let file = opened.map_err(Error::io(path, "create the recording"))?;
         let (producer, samples) = RingBuffer::new(ROOM);
-        let steps = StepWriter::new(BufWriter::new(file), about).map_err(failed(path))?;
+        let steps = StepWriter::new(WholeFile::new(file), about).map_err(failed(path))?;
         let path = path.to_path_buf();
         Ok((
             Self {
@@ -96,10 +97,7 @@ impl Log {
             std::thread::sleep(Duration::from_secs_f64(LOOK_S));
         }
         let file = self.steps.finish().map_err(failed(&self.path))?;
-        let file = file
-            .into_inner()
-            .map_err(std::io::IntoInnerError::into_error);
-        file.and_then(|file| file.sync_all())
+        file.finish()
             .map_err(Error::io(&self.path, "write the recording"))?;
         Ok(logged)
     }
@@ -130,6 +128,11 @@ fn message(sample: &Sample) -> StepMessage {
         force_n: finite(sample.resistance + 0.0),
         force_on_handle_n: numbers((wrench.force + DVec3::ZERO).to_array()),
         torque_on_handle_nm: numbers((wrench.torque + DVec3::ZERO).to_array()),
+        sent_force_n: Some(sample.servo.wrench_on_handle.force.to_array()),
+        armed: match sample.servo.arming {
+            Arming::NotAsked => None,
+            arming => Some(arming == Arming::Armed),
+        },
         handle_position_m: numbers(sample.handle_pose.translation.to_array()),
         handle_rotation: numbers(sample.handle_pose.rotation.to_array()),
         tool_position_m: numbers(report.tool_pose.translation.to_array()),

@@ -132,21 +132,6 @@ impl<'a> Other<'a> {
         )
     }
 
-    /// Grip of the first handle's body in the simulation, world.
-    pub(super) fn first_body(
-        &self,
-        first: &Held,
-        first_handle: &DPose3,
-        report: &StepReport,
-    ) -> DPose3 {
-        let (tool, part) = self.bodies(first, first_handle);
-        let body = match first.holds {
-            Holds::Tool => part * report.tool_pose,
-            Holds::Part => tool * report.tool_pose.inverse(),
-        };
-        at_grip(&body, first.grip)
-    }
-
     /// Tool and part in the world, where the handles want them.
     fn bodies(&self, first: &Held, first_handle: &DPose3) -> (DPose3, DPose3) {
         let of_first = at_grip(first_handle, -first.grip);

@@ -1,6 +1,6 @@
 //! Who is told of each period, on the loop's thread: nothing here allocates, locks or waits.
 
-use device::{PeriodRecord, Phase, Wrench};
+use device::{Arming, PeriodRecord, Phase, Wrench};
 use glam::DVec3;
 use glamx::DPose3;
 use triple_buffer::{Input, Output, TripleBuffer};
@@ -106,7 +106,34 @@ pub(super) struct Ports<'a> {
     pub(super) snap: SnapWatch,
     /// N, the most that went to the device.
     pub(super) largest_rendered: f64,
+    /// Length of a period, s, where times are those of the clock: with what the loop skipped.
+    pub(super) clock_period_s: Option<f64>,
+    pub(super) n_skipped: u64,
+    pub(super) force: ForceOn,
     pub(super) solved: Option<Pending>,
+}
+
+/// Whether the hand was given force at all.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ForceOn {
+    /// s, when it was armed first.
+    pub since_s: Option<f64>,
+    /// Periods in contact in which it was not armed.
+    pub n_unarmed_contacts: u64,
+    /// What was waited for last.
+    pub arming: Arming,
+}
+
+impl ForceOn {
+    fn follow(&mut self, arming: &Arming, time_s: f64, touches: bool) {
+        self.arming = *arming;
+        match arming {
+            Arming::NotAsked | Arming::Armed => {
+                self.since_s.get_or_insert(time_s);
+            }
+            Arming::Waiting(_) | Arming::Rising => self.n_unarmed_contacts += u64::from(touches),
+        }
+    }
 }
 
 /// A step whose period is not over yet.
@@ -168,12 +195,19 @@ impl<'a> Ports<'a> {
     pub(super) fn over(&mut self, servo: &PeriodRecord) {
         let rendered = servo.wrench_on_handle.force.length();
         self.largest_rendered = self.largest_rendered.max(rendered);
+        self.n_skipped += servo.skipped;
         let Some(solved) = self.solved.take() else {
             return;
         };
+        let slot = (servo.index + self.n_skipped) as f64;
+        let time_s = self
+            .clock_period_s
+            .map_or(solved.time_s, |period_s| slot * period_s);
+        self.force
+            .follow(&servo.arming, time_s, solved.report.contacts > 0);
         let sample = Sample {
             step: servo.index,
-            time_s: solved.time_s,
+            time_s,
             phase: solved.phase,
             handle_pose: solved.handle_pose,
             gone: solved.gone,

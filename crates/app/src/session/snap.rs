@@ -3,8 +3,8 @@
 use device::Phase;
 
 /// Of the peak, by how much the force falls when it snaps. Less is the roughness of a mesh: contact that goes from node
-/// to node steps by a tenth.
-const FALL: f64 = 0.3;
+/// to node steps by a tenth, that of a sharp edge by a third.
+const FALL: f64 = 0.5;
 
 /// N: below, nothing is felt (a device renders steps of some 0.2 N).
 const LEAST: f64 = 0.05;
@@ -27,7 +27,20 @@ pub struct SnapWatch {
     pub n_snaps_in: u32,
     /// Times that it came off.
     pub n_snaps_out: u32,
+    /// Peak before the last snap in.
+    pub snap_in: SnapPeak,
+    /// Peak before it came off the last time.
+    pub snap_out: SnapPeak,
     rise: Rise,
+}
+
+/// A peak that was passed.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SnapPeak {
+    /// N.
+    pub force: f64,
+    /// m.
+    pub travel: f64,
 }
 
 /// One rise of the force, in one direction.
@@ -68,10 +81,16 @@ impl SnapWatch {
         let counts = !rise.is_over && rise.peak.abs() > LEAST;
         if counts && has_fallen && goes_on {
             rise.is_over = true;
+            let passed = SnapPeak {
+                force: rise.peak.abs(),
+                travel: rise.at,
+            };
             if sign > 0.0 {
                 self.n_snaps_in += 1;
+                self.snap_in = passed;
             } else {
                 self.n_snaps_out += 1;
+                self.snap_out = passed;
             }
         }
         // A new rise begins where the force has gone, or turned.
@@ -119,6 +138,8 @@ mod tests {
             &[(5.0, 0.0), (4.0, -8.2), (3.0, 2.0), (0.0, 0.0)],
         );
         assert_eq!((watch.n_snaps_in, watch.n_snaps_out), (1, 1));
+        assert!((watch.snap_in.force - 8.4).abs() < 1e-12);
+        assert!((watch.snap_out.force - 8.2).abs() < 1e-12);
         assert!((watch.peak_force - 8.4).abs() < 1e-12);
         assert!((watch.travel_at_peak - 3e-3).abs() < 1e-12);
         assert!((watch.peak_retention - 8.2).abs() < 1e-12);
@@ -135,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn roughness_of_a_tenth_is_no_snap() {
+    fn roughness_is_no_snap() {
         let mut watch = SnapWatch::default();
         go(
             &mut watch,

@@ -96,6 +96,7 @@ fn run_with(
             held: spec.held,
             mapped: None,
             other: None,
+            saturation: None,
             drive: Drive::Scripted {
                 script,
                 n_periods: N_PERIODS,

@@ -258,7 +258,7 @@ impl<F: FnMut() -> Result<Connected, Unavailable>> Worker<F> {
             let took_s = begun.elapsed().as_secs_f64();
             if took_s > STALE_S {
                 self.say(format!(
-                    "{name} did not return for {:.0} ms; the force was taken to zero meanwhile",
+                    "{name} or this machine was busy for {:.0} ms; the force was taken to zero meanwhile",
                     1e3 * took_s
                 ));
             }

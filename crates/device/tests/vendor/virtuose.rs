@@ -287,7 +287,7 @@ fn library_that_blocks_is_told_and_the_force_comes_back_from_zero() {
     let before = stub.lines();
     stub.set("block:virtGetPosition", 150.0);
     drive_until(&mut opened, wrench(), "silence", |state| state.is_none());
-    message(&opened, "did not return");
+    message(&opened, "was busy for");
     drive_until(&mut opened, wrench(), "zero force", |_| {
         stub.has_zero_since(before, "virtSetForce")
     });

@@ -260,13 +260,6 @@ pub(super) fn coupled(
     Ok((scene, text))
 }
 
-/// m, how far a handle that nothing holds back may be ahead: enough for one and a half times the largest force (N) of the
-/// way, so that every peak can be passed, and half a millimetre for parts that hardly resist.
-pub(super) fn stretch(largest_force: f64, scene: &Scene) -> f64 {
-    const LEAST: f64 = 5e-4;
-    LEAST + 1.5 * largest_force / scene.coupling.translational_stiffness
-}
-
 /// A right-handed permutation of axes with signs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Axes(pub(super) DQuat);

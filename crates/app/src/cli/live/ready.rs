@@ -43,7 +43,10 @@ impl Loaded {
         let progress = ui.progress();
         let has_friction = drive::calls_for_friction(&scene, &prepared, tool.clone(), &progress)?;
         let scene = scene.with_friction(has_friction);
-        let period_s = args.rate.map_or(Ok(scene.device.servo_period), period_of)?;
+        let period_s = match args.rate {
+            Some(rate) => period_of(rate)?,
+            None => period_of_scene(&scene)?,
+        };
         let held = setup::held(&scene, &prepared, &tool);
         Ok(Self {
             session: setup::live_session(&scene, held, period_s),
@@ -59,6 +62,19 @@ impl Loaded {
         let mesh = &self.prepared.loaded.mesh;
         self.session.held.other(&self.tool, mesh)
     }
+}
+
+/// What a scene asks for may be more than a live loop can keep.
+fn period_of_scene(scene: &Scene) -> Result<f64, Error> {
+    let period_s = scene.device.servo_period;
+    period_of(period_s.recip()).map_err(|_| {
+        Error::Input(format!(
+            "{}: device.servo_period of {period_s} s is {} forces per second, and a live session has 100 to 10000; give \
+             --rate",
+            scene.path.display(),
+            period_s.recip()
+        ))
+    })
 }
 
 /// All of it.
@@ -101,19 +117,19 @@ impl Ready {
             }
         };
         let mut spec = LiveSpec {
-            n_periods: first.n_periods(args.seconds, session.period_s)?,
+            n_periods: first.n_periods(session.period_s),
+            seconds: checked_seconds(args.seconds)?,
             mapping: first.mapping(args.axes, args.scale, session.held)?,
             clutch: args.clutch.map_or(0, |button| 1 << (button - 1)),
-            stretch_max: None,
+            slips: first.is_rate,
+            largest_force: live::largest_force(&session, &mut engine),
             stiffness: scene.coupling.translational_stiffness,
             lever: part_extent(&prepared.loaded.mesh),
             servo: ServoSettings::live(&limits)?,
             session,
         };
         if first.is_rate {
-            // Nothing holds the hand back, and what a motor shakes does no work on it.
-            let largest = live::largest_force(&spec.session, &mut engine);
-            spec.stretch_max = Some(open::stretch(largest, &scene));
+            // What a motor shakes does no work on the hand.
             spec.servo.safety.passivity = None;
         }
         Ok(Self {
@@ -139,26 +155,29 @@ impl Hand {
         scale: f64,
         held: Held,
     ) -> Result<Option<Mapping>, Error> {
-        if self.is_in_world {
-            return Ok(None);
-        }
         let settings = MappingSettings {
             axes: axes.0,
             scale,
             ..MappingSettings::default()
         };
-        Ok(Some(Mapping::new(settings, held.start())?))
+        let mapping = Mapping::new(settings, held.start())?;
+        Ok((!self.is_in_world).then_some(mapping))
     }
 
-    /// Periods at most: as long as the user says, and as its script goes.
-    fn n_periods(&self, seconds: Option<f64>, period_s: f64) -> Result<Option<u64>, Error> {
-        if let Some(seconds) = seconds.filter(|s| !(s.is_finite() && *s > 0.0)) {
-            return Err(Error::Input(format!(
-                "--for {seconds} is no time above 0 s"
-            )));
+    /// Periods of its script, which goes by the loop's own time.
+    fn n_periods(&self, period_s: f64) -> Option<u64> {
+        self.ends_after_s.map(|s| (s / period_s).ceil() as u64)
+    }
+}
+
+/// As long as the user says, by the clock.
+fn checked_seconds(seconds: Option<f64>) -> Result<Option<f64>, Error> {
+    /// A hundred years: more is no time a clock can be asked for.
+    const MOST: f64 = 3e9;
+    match seconds {
+        Some(s) if !(s > 0.0 && s < MOST) => {
+            Err(Error::Input(format!("--for {s} is no time above 0 s")))
         }
-        let least = seconds.into_iter().chain(self.ends_after_s);
-        let least = least.min_by(f64::total_cmp);
-        Ok(least.map(|s| (s / period_s).ceil() as u64))
+        seconds => Ok(seconds),
     }
 }

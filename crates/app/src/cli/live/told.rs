@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use super::super::json_text;
 use super::ready::Ready;
 use crate::report::plot::short;
+use crate::session::SnapPeak;
 use crate::session::live::LiveReport;
 use crate::session::log::Logged;
 
@@ -31,14 +32,15 @@ impl Told<'_> {
             force => format!(
                 "{force:.3} N at {:.3} mm; came off {}",
                 1e3 * snap.travel_at_retention,
-                times(snap.n_snaps_out)
+                times(snap.n_snaps_out, &snap.snap_out)
             ),
         };
         let mut text = format!(
             "{}\n  device                {}\n  coupling              {} N/m, {} N m/rad, in series with the contact\n  \
-             going in              {:.3} N at {:.3} mm of travel; snapped in {}\n  \
+             going in              {:.3} N at {:.3} mm of travel at most; snapped in {}\n  \
              pulling out           {}\n  \
-             on the hand           {:.3} N at most\n  \
+             on the hand           {:.3} N at most{}\n  \
+             friction              {}\n  \
              loop                  {} periods of {} ms, {} missed ({} in a row at most), {} skipped\n  \
              response              median {:.1} us, 99 % below {:.1} us, longest {:.1} us; woken late by {:.1}, {:.1}, {:.1} us\n",
             self.ready.scene.title,
@@ -47,11 +49,17 @@ impl Told<'_> {
             short(coupling.rotational_stiffness),
             snap.peak_force,
             1e3 * snap.travel_at_peak,
-            times(snap.n_snaps_in),
+            times(snap.n_snaps_in, &snap.snap_in),
             pulled,
             self.report.largest_rendered,
+            self.force_words(),
+            self.friction()
+                .map_or("none is simulated".to_owned(), |mu| format!(
+                    "coefficient {}",
+                    short(mu)
+                )),
             servo.periods,
-            1e3 * self.ready.spec.session.period_s,
+            short(1e3 * self.ready.spec.session.period_s),
             servo.missed_deadlines,
             servo.longest_miss_run,
             servo.skipped,
@@ -81,6 +89,58 @@ impl Told<'_> {
         text
     }
 
+    /// When the force was on.
+    fn force_words(&self) -> String {
+        let force = &self.report.force;
+        match force.since_s {
+            None => format!("; it was never on ({})", force.arming),
+            Some(since_s) => format!(", on since {since_s:.2} s"),
+        }
+    }
+
+    /// Coulomb's coefficient, where friction is simulated.
+    fn friction(&self) -> Option<f64> {
+        let effects = &self.ready.scene.effects;
+        effects
+            .simulated_friction()
+            .map(|mu| mu.kinetic_coefficient)
+    }
+
+    /// What makes the numbers doubtful.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        let force = &self.report.force;
+        if force.n_unarmed_contacts > 0 {
+            warnings.push(format!(
+                "warning: in {} periods of contact the force was not on yet: begin out of contact, and wait for \"force on\"",
+                force.n_unarmed_contacts
+            ));
+        }
+        if let Some(two) = &self.report.two_rates {
+            /// Of the peak, by how much problems that take each other's place may differ.
+            const SHARE: f64 = 0.1;
+            let (_, largest) = two.differences();
+            if largest > SHARE * self.report.snap.peak_force {
+                warnings.push(format!(
+                    "warning: the engine was up to {} periods behind, and its results differ by up to {largest:.2} N from what \
+                     was felt meanwhile: forces are not better than that; a faster machine, fewer contacts \
+                     (accuracy.max_contacts) or a lower --rate help",
+                    two.log.max_staleness
+                ));
+            }
+        }
+        let mut fixed = self.ready.scene.part.fixed.iter();
+        if fixed.any(|group| group.components != [true; 3]) {
+            warnings.push(
+                "warning: the part is held in some directions alone, as at a plane of symmetry, and a hand is guided by \
+                 nothing: a half or quarter of a part pushes the tool aside, and its forces here are not those of the whole \
+                 (`snapin run` guides the body along its axis)"
+                    .to_owned(),
+            );
+        }
+        warnings
+    }
+
     /// For programs.
     pub(super) fn json(&self) -> String {
         let (snap, servo) = (&self.report.snap, &self.report.servo);
@@ -98,6 +158,13 @@ impl Told<'_> {
             "peak_retention_force_N": snap.peak_retention,
             "travel_at_retention_m": snap.travel_at_retention,
             "largest_force_on_hand_N": self.report.largest_rendered,
+            "force_on_since_s": self.report.force.since_s,
+            "periods_in_contact_without_force": self.report.force.n_unarmed_contacts,
+            "snap_in_force_N": snap.snap_in.force,
+            "snap_in_travel_m": snap.snap_in.travel,
+            "snap_out_force_N": snap.snap_out.force,
+            "snap_out_travel_m": snap.snap_out.travel,
+            "friction_coefficient": self.friction(),
             "snaps_in": snap.n_snaps_in,
             "snaps_out": snap.n_snaps_out,
             "period_s": self.ready.spec.session.period_s,
@@ -118,12 +185,13 @@ impl Told<'_> {
     }
 }
 
-/// How often.
-fn times(n: u32) -> String {
+/// How often, and how the last time.
+fn times(n: u32, last: &SnapPeak) -> String {
+    let how = format!("{:.3} N at {:.3} mm", last.force, 1e3 * last.travel);
     match n {
         0 => "never".to_owned(),
-        1 => "once".to_owned(),
-        n => format!("{n} times"),
+        1 => format!("once, past {how}"),
+        n => format!("{n} times, the last past {how}"),
     }
 }
 

@@ -275,6 +275,7 @@ fn no_period_of_a_live_session_allocates() {
             at_start: None,
             viewer,
             log: Some(samples),
+            trace: None,
         };
         let (stop, is_over) = (AtomicBool::new(false), AtomicBool::new(false));
         let (report, logged) = std::thread::scope(|scope| {

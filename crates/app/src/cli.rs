@@ -11,6 +11,8 @@ mod prepare;
 mod run;
 mod serve;
 mod verify;
+#[cfg(feature = "viewer")]
+mod view;
 
 use std::ffi::OsString;
 use std::io::{IsTerminal, Write};
@@ -37,6 +39,9 @@ enum Command {
     Run(run::RunArgs),
     /// Feel a scene with a haptic device, in real time, until it is ended; no window.
     Live(live::LiveArgs),
+    /// See a scene in a window, held by mouse and keys or by a haptic device; or write a picture of it.
+    #[cfg(feature = "viewer")]
+    View(view::ViewArgs),
     /// Show what accuracy costs in time, for each choice: tables, CSV, plots.
     Accuracy(accuracy::AccuracyArgs),
     /// Show what each physical effect changes and costs, and which are simulated: table, CSV, plot.
@@ -149,6 +154,8 @@ fn command(
     let result = match &cli.command {
         Command::Run(args) => run::run(args, out, &ui),
         Command::Live(args) => live::run(args, out, &ui),
+        #[cfg(feature = "viewer")]
+        Command::View(args) => view::run(args, out, &ui),
         Command::Accuracy(args) => accuracy::run(args, out, &ui),
         Command::Effects(args) => effects::run(args, out, &ui),
         Command::Prepare(args) => prepare::run(args, out, &ui),

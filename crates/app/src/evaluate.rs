@@ -1,6 +1,6 @@
 //! From a recording to what the report tells: moments worth a picture, extremes, verdicts.
 
-mod drawing;
+pub(crate) mod drawing;
 mod handbook;
 mod moments;
 mod skin;
@@ -415,7 +415,7 @@ fn rate_facts(recording: &Recording) -> RateFacts {
 }
 
 /// As the scene says; else along the tool's axis if it has one, or across the approach.
-fn viewing(scene: &Scene, approach: DVec3) -> Viewing {
+pub(crate) fn viewing(scene: &Scene, approach: DVec3) -> Viewing {
     let axis = match scene.tool.shape {
         ToolShape::Cylinder { .. } | ToolShape::Capsule { .. } => {
             scene.tool.pose_part_tool.rotation * DVec3::Z

@@ -34,6 +34,8 @@ pub mod setup;
 pub mod shape;
 pub mod stored;
 pub mod study;
+#[cfg(feature = "viewer")]
+mod viewer;
 
 pub use cli::run;
 pub use error::Error;

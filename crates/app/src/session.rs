@@ -50,12 +50,13 @@ use fast::FastSettings;
 pub use held::{Gone, Held, Holds};
 pub use overlap::{Clearance, refuse_overlap};
 use ports::Ports;
-pub use ports::{Sample, Snapshot, SnapshotInput, SnapshotOutput, snapshots};
+pub use ports::{Sample, Snapshot, SnapshotInput, SnapshotOutput, TracePoint, snapshots};
 use rates::{Rates, TwoRates, choose};
 pub(crate) use recording::Entry;
 pub use recording::{Record, Recording};
 use slow::{SlowStep, Stepped};
 pub use snap::{SnapPeak, SnapWatch};
+pub(crate) use watch::StopOnDrop;
 
 /// Servo periods between two evaluations of the whole surface: 60 Hz at 1 kHz.
 const DISPLAY_INTERVAL: u64 = 16;

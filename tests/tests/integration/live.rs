@@ -139,6 +139,7 @@ impl Clip {
             at_start: None,
             viewer,
             log: Some(samples),
+            trace: None,
         };
         let (stop, is_written) = (AtomicBool::new(false), AtomicBool::new(false));
         let (spec, engine) = (&self.spec, &mut self.engine);

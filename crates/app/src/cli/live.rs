@@ -1,15 +1,14 @@
 //! `snapin live`: a scene in the hand, until it is ended.
 
-mod open;
-mod ready;
-mod told;
+pub(super) mod open;
+pub(super) mod ready;
+pub(super) mod told;
 
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::sync::mpsc::{Receiver, channel};
-use std::thread::ScopedJoinHandle;
 use std::time::{Duration, Instant};
 
 use clap::Args;
@@ -21,7 +20,7 @@ use crate::progress::Ui;
 use crate::scene::Scene;
 use crate::session::live::{self, LivePorts, LiveReport};
 use crate::session::log::{Log, Logged};
-use crate::session::{Snapshot, SnapshotOutput, snapshots};
+use crate::session::{Snapshot, SnapshotOutput, StopOnDrop, TracePoint, snapshots};
 use crate::shape::Shape;
 use open::Devices;
 use ready::{Loaded, Ready};
@@ -30,14 +29,14 @@ use told::Told;
 #[derive(Debug, Args)]
 pub(super) struct LiveArgs {
     /// Scene file.
-    scene: PathBuf,
+    pub(super) scene: PathBuf,
     /// Device, as `snapin devices` names it; `simulated` (the scene's device.model) or `simulated:MODEL` is held by the
     /// scene's hand.
     #[arg(long, value_name = "NAME", default_value = "simulated")]
-    device: String,
+    pub(super) device: String,
     /// A second device for the other hand, which holds the other body (part or tool).
     #[arg(long, value_name = "NAME")]
-    second_device: Option<String>,
+    pub(super) second_device: Option<String>,
     /// Axes of the second device in the scene, as --axes.
     #[arg(
         long,
@@ -45,7 +44,7 @@ pub(super) struct LiveArgs {
         default_value = "+x+y+z",
         allow_hyphen_values = true
     )]
-    second_axes: open::Axes,
+    pub(super) second_axes: open::Axes,
     /// Forces sent to the device per second, 100 to 10000 (default: the scene's device.servo_period).
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     rate: Option<f64>,
@@ -77,15 +76,15 @@ pub(super) struct LiveArgs {
     seconds: Option<f64>,
     /// Folder for recordings (default: out/ and the scene's name with -live); nothing there is overwritten.
     #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
+    pub(super) out: Option<PathBuf>,
     /// Record nothing.
     #[arg(long, conflicts_with = "out")]
-    no_recording: bool,
+    pub(super) no_recording: bool,
     /// Print the summary as JSON.
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
     #[command(flatten)]
-    cache: CacheArgs,
+    pub(super) cache: CacheArgs,
 }
 
 /// Time between two looks at the newest snapshot, s.
@@ -105,35 +104,101 @@ pub(super) fn run(args: &LiveArgs, out: &mut dyn Write, ui: &Ui<'_>) -> Result<u
     let mut ready = Ready::new(args, loaded, devices.first()?)?;
     ui.note(&format!("coupling {}", ready.coupling));
     ui.note(&ready.rates.words());
-    let (report, logged) = feel(args, &mut ready, &mut devices, files.as_ref(), ui)?;
+    let session = Session {
+        args,
+        ready: &mut ready,
+        devices: &mut devices,
+        files: files.as_ref(),
+        trace: None,
+    };
+    let (report, logged) = feel(session, ui, |seat| {
+        Eye::new(seat, ui).look_on();
+        Ok(())
+    })?;
     ui.end_status();
+    tell(
+        args,
+        &ready,
+        &devices,
+        files.as_ref(),
+        (&report, logged),
+        out,
+        ui,
+    )?;
+    Ok(0)
+}
+
+/// Prints the summary with its warnings, and writes it beside the recording.
+///
+/// # Errors
+/// What cannot be written.
+pub(super) fn tell(
+    args: &LiveArgs,
+    ready: &Ready,
+    devices: &Devices,
+    files: Option<&Files>,
+    (report, logged): (&LiveReport, Option<Logged>),
+    out: &mut dyn Write,
+    ui: &Ui<'_>,
+) -> Result<(), Error> {
     let told = Told {
-        ready: &ready,
+        ready,
         devices: devices.names(),
-        report: &report,
+        report,
         logged: logged.as_ref(),
-        recording: files.as_ref().map(|files| files.recording.as_path()),
+        recording: files.map(|files| files.recording.as_path()),
     };
     told.warnings().iter().for_each(|line| ui.note(line));
     print(out, &if args.json { told.json() } else { told.text() })?;
-    if let Some(files) = &files
+    if let Some(files) = files
         && let Err(e) = std::fs::write(&files.summary, told.json())
     {
         // Half a summary is none.
         let _ = std::fs::remove_file(&files.summary);
         return Err(Error::io(&files.summary, "write the summary")(e));
     }
-    Ok(0)
+    Ok(())
 }
 
-/// The session itself: the loop on a thread of its own, the recording on another, and this one looks on.
-fn feel(
-    args: &LiveArgs,
-    ready: &mut Ready,
-    devices: &mut Devices,
-    files: Option<&Files>,
+/// A session that is to be.
+pub(super) struct Session<'a> {
+    pub(super) args: &'a LiveArgs,
+    pub(super) ready: &'a mut Ready,
+    pub(super) devices: &'a mut Devices,
+    pub(super) files: Option<&'a Files>,
+    /// Every period for a plot.
+    pub(super) trace: Option<rtrb::Producer<TracePoint>>,
+}
+
+/// What the thread that looks on has of the loop.
+pub(super) struct Seat<'a> {
+    /// The newest period.
+    pub(super) view: SnapshotOutput,
+    /// The surface's motion, where somebody wants it.
+    pub(super) shape: Option<&'a mut Shape>,
+    /// What devices tell.
+    pub(super) messages: Vec<&'a Receiver<String>>,
+    /// Whether the loop has ended.
+    pub(super) is_over: &'a dyn Fn() -> bool,
+}
+
+/// The session itself: the loop on a thread of its own, the recording on another, and this one looks on; when it does not
+/// any more, the loop ends.
+///
+/// # Errors
+/// Settings that the loop refuses, files that cannot be written, and what the one who looks on says.
+pub(super) fn feel(
+    session: Session<'_>,
     ui: &Ui<'_>,
+    look_on: impl FnOnce(Seat<'_>) -> Result<(), Error>,
 ) -> Result<(LiveReport, Option<Logged>), Error> {
+    let Session {
+        args,
+        ready,
+        devices,
+        files,
+        trace,
+    } = session;
     let about = BTreeMap::from([
         ("title".to_owned(), ready.scene.title.clone()),
         ("scene".to_owned(), ready.scene.path.display().to_string()),
@@ -152,20 +217,17 @@ fn feel(
         })),
         viewer,
         log: samples,
+        trace,
     };
     let (hands, mut messages) = devices.hands(args, ready)?;
     messages.push(&granted_words);
-    let mut eye = Eye {
-        view,
-        shape: ready.shape.as_mut(),
-        messages,
-        told: Vec::new(),
-        ui,
-    };
     let (stop, is_written) = (AtomicBool::new(false), AtomicBool::new(false));
     let (spec, rates, engine) = (&ready.spec, &ready.rates, &mut ready.engine);
+    let shape = ready.shape.as_mut();
     std::thread::scope(|scope| {
         let written = log.map(|log| scope.spawn(|| log.write(&is_written)));
+        // Also where the one who looks on panics.
+        let end_of_log = StopOnDrop(&is_written);
         let haptic = std::thread::Builder::new()
             .name("haptic loop".to_owned())
             .spawn_scoped(scope, || {
@@ -175,21 +237,30 @@ fn feel(
                 Path::new("the haptic loop"),
                 "start the thread of",
             ))?;
-        eye.look_on(&haptic);
-        is_written.store(true, Ordering::Release);
-        let report = haptic.join().map_err(|_| Error::EngineEnded)?;
+        let end_of_loop = StopOnDrop(&stop);
+        let seen = look_on(Seat {
+            view,
+            shape,
+            messages,
+            is_over: &|| haptic.is_finished(),
+        });
+        drop(end_of_loop);
+        let report = haptic.join().map_err(|_| Error::EngineEnded);
+        drop(end_of_log);
+        let report = report?;
         let logged = written.map(|thread| thread.join().map_err(|_| Error::EngineEnded));
         let logged = logged.transpose()?.transpose().unwrap_or_else(|error| {
             ui.note(&format!("warning: the recording is cut short: {error}"));
             None
         });
+        seen?;
         Ok((report?, logged))
     })
 }
 
 /// The files of a session: the first number that is free.
-struct Files {
-    recording: PathBuf,
+pub(super) struct Files {
+    pub(super) recording: PathBuf,
     summary: PathBuf,
 }
 
@@ -198,7 +269,7 @@ impl Files {
     ///
     /// # Errors
     /// A folder or file that cannot be made.
-    fn new(args: &LiveArgs) -> Result<Option<Self>, Error> {
+    pub(super) fn new(args: &LiveArgs) -> Result<Option<Self>, Error> {
         if args.no_recording {
             return Ok(None);
         }
@@ -243,28 +314,31 @@ impl Drop for Files {
 
 /// What looks on while the loop goes: messages, status, and the columns that come next.
 struct Eye<'a, 'u> {
-    view: SnapshotOutput,
-    shape: Option<&'a mut Shape>,
-    messages: Vec<&'a Receiver<String>>,
+    seat: Seat<'a>,
     /// What the guard did and was told.
     told: Vec<&'static str>,
     ui: &'a Ui<'u>,
 }
 
-impl Eye<'_, '_> {
+impl<'a, 'u> Eye<'a, 'u> {
+    fn new(seat: Seat<'a>, ui: &'a Ui<'u>) -> Self {
+        let told = Vec::new();
+        Self { seat, told, ui }
+    }
+
     /// Until the loop ends.
-    fn look_on<T>(&mut self, haptic: &ScopedJoinHandle<'_, T>) {
+    fn look_on(&mut self) {
         let begun = Instant::now();
         let mut looks = 0;
-        while !haptic.is_finished() {
+        while !(self.seat.is_over)() {
             self.tell();
-            if self.view.update() {
-                let snapshot = self.view.output_buffer();
+            if self.seat.view.update() {
+                let snapshot = self.seat.view.output_buffer();
                 if let Some(sample) = &snapshot.sample {
                     let news = told::news(&sample.servo.safety, &mut self.told);
                     news.for_each(|news| self.ui.note(&news));
                 }
-                if let (Some(shape), Some(sample)) = (&mut self.shape, &snapshot.sample) {
+                if let (Some(shape), Some(sample)) = (&mut self.seat.shape, &snapshot.sample) {
                     // What cannot be drawn is not fetched ahead; the step says so itself.
                     let _ = shape.update(snapshot.contacts());
                     shape.look_ahead(sample.report.tool_pose);
@@ -280,7 +354,7 @@ impl Eye<'_, '_> {
     }
 
     fn tell(&self) {
-        let messages = self.messages.iter().flat_map(|m| m.try_iter());
+        let messages = self.seat.messages.iter().flat_map(|m| m.try_iter());
         messages.for_each(|message| self.ui.note(&message));
     }
 }

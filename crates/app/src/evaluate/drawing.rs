@@ -35,7 +35,7 @@ fn edges(order: Order) -> &'static [&'static [usize]] {
     }
 }
 
-pub(super) fn part(mesh: &Mesh) -> PartDrawing {
+pub(crate) fn part(mesh: &Mesh) -> PartDrawing {
     let faces = mesh.boundary_faces();
     PartDrawing {
         nodes: mesh.nodes.iter().map(|x| DVec3::from_array(*x)).collect(),

@@ -5,12 +5,12 @@
 
 mod camera;
 mod canvas;
-mod colour;
-mod overlay;
+pub(crate) mod colour;
+pub(crate) mod overlay;
 mod paint;
 mod section;
-mod surface;
-mod viewpoint;
+pub(crate) mod surface;
+pub(crate) mod viewpoint;
 
 use glam::DVec3;
 
@@ -124,7 +124,7 @@ impl Scene {
             .map(|p| p.clamp(low - DVec3::splat(reach), high + DVec3::splat(reach)))
             .collect();
         points.extend(near);
-        let viewpoint = viewpoint::choose(run, &points);
+        let viewpoint = viewpoint::choose(&run.part, &run.frames, &run.viewing, &points);
         Self {
             title: run.title.clone(),
             scale: RunScale::of(run),
@@ -148,7 +148,7 @@ impl Scene {
         frame: &Frame,
         quantity: Quantity,
     ) -> Result<Vec<u8>, String> {
-        encode(&self.pixels(part, frame, quantity)?)
+        encode(&self.pixels(part, frame, quantity)?, SIZE)
     }
 
     /// The picture, three bytes per pixel, rows from the top.
@@ -214,7 +214,7 @@ impl Scene {
         let largest =
             finite(self.surface_nodes.iter().map(|&n| values[n as usize])).fold(0.0, f64::max);
         picture.colour_bar(&bar, largest);
-        picture.axes(&self.camera);
+        picture.axes(|axis| self.camera.on_picture(axis));
         picture.scale_bar(self.camera.pixels_per_metre() / SAMPLES as f64);
         picture.text(&self.legend(frame, quantity, &painter), (350, 908), 25);
         Ok(averaged(&picture.finish()?, SIZE, SAMPLES))
@@ -262,7 +262,7 @@ fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
     values.get(rank.max(1) - 1).copied().unwrap_or(0.0)
 }
 
-fn bounds(points: &[DVec3]) -> (DVec3, DVec3) {
+pub(crate) fn bounds(points: &[DVec3]) -> (DVec3, DVec3) {
     let first = points.first().copied().unwrap_or_default();
     points
         .iter()
@@ -290,9 +290,13 @@ fn averaged(bytes: &[u8], (width, height): (usize, usize), samples: usize) -> Ve
     pixels
 }
 
-fn encode(pixels: &[u8]) -> Result<Vec<u8>, String> {
+/// A picture of this size, three bytes per pixel, as the bytes of a PNG file.
+///
+/// # Errors
+/// What the encoder says.
+pub(crate) fn encode(pixels: &[u8], size: (usize, usize)) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, SIZE.0 as u32, SIZE.1 as u32);
+    let mut encoder = png::Encoder::new(&mut bytes, size.0 as u32, size.1 as u32);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_compression(png::Compression::Balanced);

@@ -11,7 +11,7 @@ use super::fast::FastSettings;
 use super::other::Other;
 pub use super::other::{SecondHand, SecondReport};
 pub use super::ports::ForceOn;
-use super::ports::{Ports, SnapshotInput};
+use super::ports::{Ports, SnapshotInput, TracePoint};
 use super::rates::{ChosenRates, TwoRates, choose};
 use super::saturation::Saturation;
 use super::tangent::Tangent;
@@ -68,6 +68,8 @@ pub struct LivePorts<'a> {
     pub viewer: SnapshotInput,
     /// Every period.
     pub log: Option<rtrb::Producer<Sample>>,
+    /// Every period, as a plot needs it.
+    pub trace: Option<rtrb::Producer<TracePoint>>,
 }
 
 /// What a live session leaves behind.
@@ -186,6 +188,7 @@ pub fn run_on<'a, 'h: 'a, C: Clock>(
                 viewer: Some(ports.viewer),
                 log: ports.log,
                 clock_period_s: Some(spec.session.period_s),
+                trace: ports.trace,
                 ..Ports::default()
             },
         },

@@ -53,6 +53,19 @@ impl Snapshot {
     }
 }
 
+/// A period as a plot needs it.
+#[derive(Clone, Copy, Debug)]
+pub struct TracePoint {
+    /// m, of the held body along the approach direction.
+    pub travel: f64,
+    /// N, along the approach direction, positive when it resists.
+    pub resistance: f64,
+    /// s, scheduled time to the end of the write.
+    pub response_s: f64,
+    /// Whether the end was after the next scheduled time.
+    pub is_late: bool,
+}
+
 /// The loop's end of the newest-value box for a viewer.
 #[derive(Debug)]
 pub struct SnapshotInput(Input<Snapshot>);
@@ -99,6 +112,8 @@ pub(super) struct Ports<'a> {
     pub(super) recording: Option<&'a mut Recording>,
     /// All periods, for a thread that writes them.
     pub(super) log: Option<rtrb::Producer<Sample>>,
+    /// All periods for a plot; those that it has no room for are left out.
+    pub(super) trace: Option<rtrb::Producer<TracePoint>>,
     /// Periods for which that thread was too slow.
     pub(super) n_unlogged: u64,
     /// The newest period.
@@ -217,6 +232,16 @@ impl<'a> Ports<'a> {
             step_ns: solved.step_ns,
             servo: *servo,
         };
+        if let Some(trace) = &mut self.trace {
+            let point = TracePoint {
+                travel: sample.gone.travel,
+                resistance: sample.resistance,
+                response_s: servo.response_s,
+                is_late: servo.is_late,
+            };
+            // A plot may have gaps.
+            let _ = trace.push(point);
+        }
         if let Some(log) = &mut self.log {
             self.n_unlogged += u64::from(log.push(sample).is_err());
         }

@@ -82,7 +82,7 @@ fn look(snapshot: &super::Snapshot, shape: &mut Shape, seen: &mut Watched) -> Re
 }
 
 /// Tells a thread beside to end.
-pub(super) struct StopOnDrop<'a>(pub(super) &'a AtomicBool);
+pub(crate) struct StopOnDrop<'a>(pub(crate) &'a AtomicBool);
 
 impl Drop for StopOnDrop<'_> {
     fn drop(&mut self) {

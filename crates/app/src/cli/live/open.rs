@@ -3,6 +3,8 @@
 use std::str::FromStr;
 use std::sync::mpsc::{Receiver, channel};
 
+#[cfg(feature = "viewer")]
+use device::Guide;
 use device::driver::simulated::Model;
 use device::driver::{self, Unavailable};
 use device::{
@@ -26,7 +28,7 @@ const DEVICE: &str = "--device";
 const SECOND: &str = "--second-device";
 
 /// The devices of a session.
-pub(super) struct Devices {
+pub(in crate::cli) struct Devices {
     first: Option<Hand>,
     second: Option<Hand>,
 }
@@ -36,7 +38,7 @@ impl Devices {
     ///
     /// # Errors
     /// Why one cannot be opened.
-    pub(super) fn external(args: &LiveArgs) -> Result<Self, Error> {
+    pub(in crate::cli) fn external(args: &LiveArgs) -> Result<Self, Error> {
         let second = args.second_device.as_deref();
         let second = second.map(|name| external(SECOND, name));
         Ok(Self {
@@ -49,7 +51,11 @@ impl Devices {
     ///
     /// # Errors
     /// A model that does not exist; a way that leaves the device's workspace.
-    pub(super) fn add_simulated(&mut self, args: &LiveArgs, loaded: &Loaded) -> Result<(), Error> {
+    pub(in crate::cli) fn add_simulated(
+        &mut self,
+        args: &LiveArgs,
+        loaded: &Loaded,
+    ) -> Result<(), Error> {
         let session = &loaded.session;
         if self.first.is_none() {
             let of_scene = loaded.scene.device.model;
@@ -61,24 +67,49 @@ impl Devices {
         Ok(())
     }
 
+    /// In place of a simulated one in the scene's hand: one in a hand that is moved from outside. `None` where the first
+    /// device is really there.
+    ///
+    /// # Errors
+    /// A model that does not exist.
+    #[cfg(feature = "viewer")]
+    pub(in crate::cli) fn add_guided(
+        &mut self,
+        args: &LiveArgs,
+        loaded: &Loaded,
+    ) -> Result<Option<Guided>, Error> {
+        if self.first.is_some() {
+            return Ok(None);
+        }
+        let session = &loaded.session;
+        let model = model(&args.device, loaded.scene.device.model)?;
+        let (guide, hand) =
+            SimulatedHand::guided(session.hand, session.held.start(), session.period_s)?;
+        self.first = Some(in_world(Simulated::of_model(model, hand)?, None));
+        Ok(Some(Guided {
+            guide,
+            reach: model.limits.workspace_half_extents,
+        }))
+    }
+
     fn all(&self) -> impl Iterator<Item = &Hand> {
         self.first.iter().chain(&self.second)
     }
 
     /// What the user should know at once.
-    pub(super) fn notes(&self) -> impl Iterator<Item = &String> {
+    pub(in crate::cli) fn notes(&self) -> impl Iterator<Item = &String> {
         self.all().flat_map(|hand| &hand.notes)
     }
 
     /// Of both.
-    pub(super) fn names(&self) -> String {
+    pub(in crate::cli) fn names(&self) -> String {
         let names: Vec<&str> = self.all().map(|hand| hand.device.name()).collect();
         names.join(" and ")
     }
 
     /// # Errors
     /// Where none was opened.
-    pub(super) fn first(&self) -> Result<&Hand, Error> {
+    pub(in crate::cli) fn first(&self) -> Result<&Hand, Error> {
         let none = || Error::Input("no device is open".to_owned());
         self.first.as_ref().ok_or_else(none)
     }
@@ -87,7 +118,7 @@ impl Devices {
     ///
     /// # Errors
     /// A scale or limits that are none.
-    pub(super) fn hands(
+    pub(in crate::cli) fn hands(
         &mut self,
         args: &LiveArgs,
         ready: &Ready,
@@ -112,17 +143,25 @@ impl Devices {
     }
 }
 
+/// What moves the hand of a simulated device.
+#[cfg(feature = "viewer")]
+pub(in crate::cli) struct Guided {
+    pub(in crate::cli) guide: Guide,
+    /// m, how far the handle gets from its start along each axis of the world.
+    pub(in crate::cli) reach: DVec3,
+}
+
 /// A device, ready.
-pub(super) struct Hand {
-    pub(super) device: Box<dyn HapticDevice>,
-    pub(super) notes: Vec<String>,
-    pub(super) messages: Receiver<String>,
+pub(in crate::cli) struct Hand {
+    pub(in crate::cli) device: Box<dyn HapticDevice>,
+    pub(in crate::cli) notes: Vec<String>,
+    pub(in crate::cli) messages: Receiver<String>,
     /// Whether its frame is the scene's world.
-    pub(super) is_in_world: bool,
+    pub(in crate::cli) is_in_world: bool,
     /// Whether nothing holds its handle back.
-    pub(super) is_rate: bool,
+    pub(in crate::cli) is_rate: bool,
     /// s, of a scripted hand.
-    pub(super) ends_after_s: Option<f64>,
+    pub(in crate::cli) ends_after_s: Option<f64>,
 }
 
 impl Hand {
@@ -130,7 +169,7 @@ impl Hand {
     ///
     /// # Errors
     /// A largest force that is not one.
-    pub(super) fn limits(&self, max_force: Option<f64>) -> Result<Limits, Error> {
+    pub(in crate::cli) fn limits(&self, max_force: Option<f64>) -> Result<Limits, Error> {
         let limits = *self.device.limits();
         let Some(most) = max_force else {
             return Ok(limits);
@@ -176,10 +215,7 @@ fn cannot(flag: &str, name: &str, why: &Unavailable) -> Error {
 /// # Errors
 /// A model that does not exist; a way that leaves the device's workspace.
 fn simulated(name: &str, of_scene: DeviceModel, session: &SessionSpec) -> Result<Hand, Error> {
-    let place = name
-        .split_once(':')
-        .map_or(of_scene.key(), |(_, place)| place);
-    let model = Model::named(place).map_err(|why| cannot(DEVICE, name, &why))?;
+    let model = model(name, of_scene)?;
     let script = Script::new(&Insertion {
         start: session.held.start(),
         direction: session.direction,
@@ -194,6 +230,17 @@ fn simulated(name: &str, of_scene: DeviceModel, session: &SessionSpec) -> Result
         Simulated::of_model(model, hand)?,
         Some(ends_after_s),
     ))
+}
+
+/// The model that a name asks for.
+///
+/// # Errors
+/// One that does not exist.
+fn model(name: &str, of_scene: DeviceModel) -> Result<&'static Model, Error> {
+    let place = name
+        .split_once(':')
+        .map_or(of_scene.key(), |(_, place)| place);
+    Model::named(place).map_err(|why| cannot(DEVICE, name, &why))
 }
 
 /// A simulated device that holds the other body, in a hand that rests.
@@ -224,7 +271,7 @@ fn in_world(device: Simulated, ends_after_s: Option<f64>) -> Hand {
 ///
 /// # Errors
 /// Limits that no device has.
-pub(super) fn coupled(
+pub(in crate::cli) fn coupled(
     mut scene: Scene,
     limits: &Limits,
     period_s: f64,
@@ -262,7 +309,7 @@ pub(super) fn coupled(
 
 /// A right-handed permutation of axes with signs.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Axes(pub(super) DQuat);
+pub(in crate::cli) struct Axes(pub(in crate::cli) DQuat);
 
 impl FromStr for Axes {
     type Err = String;

@@ -19,12 +19,12 @@ use crate::study::accuracy::resolved;
 use crate::{drive, plausibility, setup};
 
 /// A scene with its part, whatever device comes.
-pub(super) struct Loaded {
-    pub(super) scene: Scene,
-    pub(super) prepared: PreparedPart,
-    pub(super) session: SessionSpec,
-    tool: Tool,
-    options: PrepareOptions,
+pub(in crate::cli) struct Loaded {
+    pub(in crate::cli) scene: Scene,
+    pub(in crate::cli) prepared: PreparedPart,
+    pub(in crate::cli) session: SessionSpec,
+    pub(in crate::cli) tool: Tool,
+    pub(in crate::cli) options: PrepareOptions,
 }
 
 impl Loaded {
@@ -32,7 +32,7 @@ impl Loaded {
     ///
     /// # Errors
     /// What the scene, its mesh or its tool are refused for; Ctrl-C.
-    pub(super) fn new(args: &LiveArgs, scene: Scene, ui: &Ui<'_>) -> Result<Self, Error> {
+    pub(in crate::cli) fn new(args: &LiveArgs, scene: Scene, ui: &Ui<'_>) -> Result<Self, Error> {
         let options = args.cache.options(false)?;
         let (scene, picked) = resolved(scene, &options, ui)?;
         let (tool, remarks) = setup::tool(&scene)?;
@@ -58,7 +58,7 @@ impl Loaded {
     }
 
     /// The body that the first device does not hold.
-    pub(super) fn other(&self) -> Held {
+    pub(in crate::cli) fn other(&self) -> Held {
         let mesh = &self.prepared.loaded.mesh;
         self.session.held.other(&self.tool, mesh)
     }
@@ -78,23 +78,27 @@ fn period_of_scene(scene: &Scene) -> Result<f64, Error> {
 }
 
 /// All of it.
-pub(super) struct Ready {
-    pub(super) scene: Scene,
+pub(in crate::cli) struct Ready {
+    pub(in crate::cli) scene: Scene,
     /// The virtual coupling, and why it is so stiff.
-    pub(super) coupling: String,
-    pub(super) engine: Engine,
-    pub(super) rates: ChosenRates,
-    pub(super) spec: LiveSpec,
+    pub(in crate::cli) coupling: String,
+    pub(in crate::cli) engine: Engine,
+    pub(in crate::cli) rates: ChosenRates,
+    pub(in crate::cli) spec: LiveSpec,
     /// What fetches columns of the compliance ahead of the tool, where they are fetched.
-    pub(super) shape: Option<Shape>,
+    pub(in crate::cli) shape: Option<Shape>,
     /// The body of a second device.
-    pub(super) other: Held,
+    pub(in crate::cli) other: Held,
 }
 
 impl Ready {
     /// # Errors
     /// A tool that overlaps the part; settings that are refused.
-    pub(super) fn new(args: &LiveArgs, loaded: Loaded, first: &Hand) -> Result<Self, Error> {
+    pub(in crate::cli) fn new(
+        args: &LiveArgs,
+        loaded: Loaded,
+        first: &Hand,
+    ) -> Result<Self, Error> {
         let limits = first.limits(args.max_force)?;
         let other = loaded.other();
         let Loaded {
@@ -149,7 +153,7 @@ impl Hand {
     ///
     /// # Errors
     /// A scale that is none.
-    pub(super) fn mapping(
+    pub(in crate::cli) fn mapping(
         &self,
         axes: open::Axes,
         scale: f64,

@@ -13,17 +13,17 @@ use crate::session::live::LiveReport;
 use crate::session::log::Logged;
 
 /// A session that is over.
-pub(super) struct Told<'a> {
-    pub(super) ready: &'a Ready,
-    pub(super) devices: String,
-    pub(super) report: &'a LiveReport,
-    pub(super) logged: Option<&'a Logged>,
-    pub(super) recording: Option<&'a Path>,
+pub(in crate::cli) struct Told<'a> {
+    pub(in crate::cli) ready: &'a Ready,
+    pub(in crate::cli) devices: String,
+    pub(in crate::cli) report: &'a LiveReport,
+    pub(in crate::cli) logged: Option<&'a Logged>,
+    pub(in crate::cli) recording: Option<&'a Path>,
 }
 
 impl Told<'_> {
     /// For the terminal.
-    pub(super) fn text(&self) -> String {
+    pub(in crate::cli) fn text(&self) -> String {
         let (snap, servo) = (&self.report.snap, &self.report.servo);
         let us = |s: f64| 1e6 * s;
         let coupling = &self.ready.scene.coupling;
@@ -142,7 +142,7 @@ impl Told<'_> {
     }
 
     /// For programs.
-    pub(super) fn json(&self) -> String {
+    pub(in crate::cli) fn json(&self) -> String {
         let (snap, servo) = (&self.report.snap, &self.report.servo);
         let times =
             |t: &device::TimeSummary| json!({"p50": t.p50_s, "p99": t.p99_s, "max": t.max_s});
@@ -217,7 +217,7 @@ fn guard_json(events: &SafetyEvents) -> Value {
 
 /// What the guard did for the first time and the user should know at once: samples that cannot be, and forces that were
 /// cut. `told`: what has been said.
-pub(super) fn news(
+pub(in crate::cli) fn news(
     events: &SafetyEvents,
     told: &mut Vec<&'static str>,
 ) -> impl Iterator<Item = String> {

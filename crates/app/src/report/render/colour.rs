@@ -17,7 +17,7 @@ const STOPS: [[f64; 3]; 7] = [
 const MISSING: [f32; 3] = [0.75, 0.75, 0.75];
 
 /// The scale at 256 equal distances, sRGB from 0 to 1.
-pub(super) fn map() -> [[f32; 3]; 256] {
+pub(crate) fn map() -> [[f32; 3]; 256] {
     std::array::from_fn(|i| {
         let t = i as f64 / 255.0 * (STOPS.len() - 1) as f64;
         let k = (t as usize).min(STOPS.len() - 2);
@@ -30,7 +30,7 @@ pub(super) fn map() -> [[f32; 3]; 256] {
 }
 
 /// Colour of `value`, clamped to 0..1.
-pub(super) fn at(map: &[[f32; 3]; 256], value: f32) -> [f32; 3] {
+pub(crate) fn at(map: &[[f32; 3]; 256], value: f32) -> [f32; 3] {
     if value.is_nan() {
         return MISSING;
     }

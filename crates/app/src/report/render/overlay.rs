@@ -7,7 +7,6 @@ use plotters::prelude::*;
 
 use super::super::font;
 use super::super::plot::short;
-use super::camera::Camera;
 use super::colour;
 
 const INK: RGBColor = RGBColor(30, 33, 38);
@@ -19,17 +18,17 @@ const BAR: (i32, i32, i32, i32) = (1130, 212, 30, 540);
 
 /// A colour scale from zero to a round number.
 #[derive(Clone, Debug)]
-pub(super) struct ColourBar {
+pub(crate) struct ColourBar {
     name: &'static str,
     unit: &'static str,
     /// Value at the end of the scale.
-    pub(super) top: f64,
+    pub(crate) top: f64,
     step: f64,
 }
 
 impl ColourBar {
     /// Reaches at least to `largest`.
-    pub(super) fn new(name: &'static str, unit: &'static str, largest: f64) -> Self {
+    pub(crate) fn new(name: &'static str, unit: &'static str, largest: f64) -> Self {
         let largest = if largest.is_finite() && largest > 0.0 {
             largest
         } else {
@@ -46,7 +45,8 @@ impl ColourBar {
         }
     }
 
-    fn ticks(&self) -> impl Iterator<Item = f64> {
+    /// Values that are written beside it, ascending.
+    pub(crate) fn ticks(&self) -> impl Iterator<Item = f64> {
         let n = (self.top / self.step + 1e-9).floor() as usize;
         (0..=n).map(|i| i as f64 * self.step)
     }
@@ -54,7 +54,7 @@ impl ColourBar {
 
 /// A picture being written upon.
 #[derive(Debug)]
-pub(super) struct Overlay {
+pub(crate) struct Overlay {
     bytes: Vec<u8>,
     size: (usize, usize),
     samples: i32,
@@ -63,7 +63,7 @@ pub(super) struct Overlay {
 
 impl Overlay {
     /// `bytes`: `samples` x `samples` samples for each pixel of a picture of this size.
-    pub(super) fn new(bytes: Vec<u8>, size: (usize, usize), samples: usize) -> Self {
+    pub(crate) fn new(bytes: Vec<u8>, size: (usize, usize), samples: usize) -> Self {
         font::register();
         Self {
             bytes,
@@ -74,7 +74,7 @@ impl Overlay {
     }
 
     /// The samples, or the first thing that could not be drawn.
-    pub(super) fn finish(self) -> Result<Vec<u8>, String> {
+    pub(crate) fn finish(self) -> Result<Vec<u8>, String> {
         match self.error {
             Some(error) => Err(error),
             None => Ok(self.bytes),
@@ -82,7 +82,7 @@ impl Overlay {
     }
 
     /// A line of text whose upper left corner is at `place`; what does not fit is cut off.
-    pub(super) fn text(&mut self, text: &str, place: (i32, i32), height: i32) {
+    pub(crate) fn text(&mut self, text: &str, place: (i32, i32), height: i32) {
         self.coloured_text(text, place, height, INK);
     }
 
@@ -113,7 +113,7 @@ impl Overlay {
     }
 
     /// The scale, with `largest` told below it: it may lie beyond the top.
-    pub(super) fn colour_bar(&mut self, bar: &ColourBar, largest: f64) {
+    pub(crate) fn colour_bar(&mut self, bar: &ColourBar, largest: f64) {
         let (left, top, width, height) = BAR;
         let map = colour::map();
         let shade = |value: f32| {
@@ -159,15 +159,15 @@ impl Overlay {
         self.text(&largest, (start, bottom + 48), 25);
     }
 
-    /// Directions of the part's axes.
-    pub(super) fn axes(&mut self, camera: &Camera) {
+    /// Directions of the part's axes. `on_picture`: right and down on the picture of a direction in space.
+    pub(crate) fn axes(&mut self, on_picture: impl Fn(DVec3) -> [f64; 2]) {
         let origin = (86, 820);
         for (axis, name, colour) in [
             (DVec3::X, "x", RGBColor(213, 94, 0)),
             (DVec3::Y, "y", RGBColor(0, 128, 90)),
             (DVec3::Z, "z", RGBColor(0, 114, 178)),
         ] {
-            let [dx, dy] = camera.on_picture(axis);
+            let [dx, dy] = on_picture(axis);
             let along = |length: f64| {
                 (
                     origin.0 + (dx * length).round() as i32,
@@ -181,7 +181,7 @@ impl Overlay {
     }
 
     /// A bar of a round length.
-    pub(super) fn scale_bar(&mut self, pixels_per_metre: f64) {
+    pub(crate) fn scale_bar(&mut self, pixels_per_metre: f64) {
         let millimetres = round_step(150.0 / pixels_per_metre * 1e3);
         let length = millimetres * 1e-3 * pixels_per_metre;
         if !(10.0..400.0).contains(&length) {
@@ -219,7 +219,7 @@ impl Overlay {
 }
 
 /// 1, 2 or 5 times a power of ten, not below a third of `about` and not beyond its double.
-fn round_step(about: f64) -> f64 {
+pub(crate) fn round_step(about: f64) -> f64 {
     if !about.is_finite() || about <= 0.0 {
         return 1.0;
     }

@@ -10,17 +10,17 @@ const CREASE_DEG: f64 = 32.0;
 
 /// A triangle surface.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Surface {
-    pub(super) nodes: Vec<DVec3>,
-    pub(super) triangles: Vec<[u32; 3]>,
+pub(crate) struct Surface {
+    pub(crate) nodes: Vec<DVec3>,
+    pub(crate) triangles: Vec<[u32; 3]>,
     /// Unit normal at each corner of each triangle.
-    pub(super) corner_normals: Vec<[DVec3; 3]>,
+    pub(crate) corner_normals: Vec<[DVec3; 3]>,
     /// Edges where the surface turns sharply or ends.
-    pub(super) creases: Vec<[u32; 2]>,
+    pub(crate) creases: Vec<[u32; 2]>,
 }
 
 impl Surface {
-    pub(super) fn new(nodes: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Self {
+    pub(crate) fn new(nodes: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Self {
         // Twice the area times the unit normal: larger neighbours count more.
         let normals: Vec<DVec3> = triangles
             .iter()
@@ -78,7 +78,7 @@ impl Surface {
     }
 
     /// From loose triangles: corners that coincide become one node.
-    pub(super) fn welded(loose: &[[DVec3; 3]]) -> Self {
+    pub(crate) fn welded(loose: &[[DVec3; 3]]) -> Self {
         let size = loose
             .iter()
             .flatten()

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::{DQuat, DVec3};
 
-use super::super::data::{ContactForce, Frame, PartDrawing, Run, View};
+use super::super::data::{ContactForce, Frame, PartDrawing, View, Viewing};
 use super::camera::Camera;
 use super::canvas::Layer;
 use super::paint::Painter;
@@ -34,32 +34,36 @@ const TRIED_CONTACTS: usize = 6;
 
 /// Where the pictures of a run are taken from.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Viewpoint {
-    pub(super) view: View,
+pub(crate) struct Viewpoint {
+    pub(crate) view: View,
     pub(super) cut: Option<Cut>,
 }
 
 /// The view that shows most of the contact, weighted by force, in the moment with the largest forces. A view that the user
 /// chose is kept, and so is that of a run without contact.
-pub(super) fn choose(run: &Run, points: &[DVec3]) -> Viewpoint {
+pub(crate) fn choose(
+    part: &PartDrawing,
+    frames: &[Frame],
+    viewing: &Viewing,
+    points: &[DVec3],
+) -> Viewpoint {
     let own = Viewpoint {
-        view: run.viewing.view,
+        view: viewing.view,
         cut: None,
     };
     let pressed = |frame: &Frame| frame.contacts.iter().map(|c| c.force.length()).sum::<f64>();
-    let strongest = run
-        .frames
+    let strongest = frames
         .iter()
         .filter(|frame| pressed(frame) > 0.0 && pressed(frame).is_finite())
         .max_by(|a, b| pressed(a).total_cmp(&pressed(b)));
     let (Some(frame), Some(way), false) = (
         strongest,
-        run.viewing.approach.try_normalize(),
-        run.viewing.is_fixed,
+        viewing.approach.try_normalize(),
+        viewing.is_fixed,
     ) else {
         return own;
     };
-    let trial = Trial::new(&run.part, frame, points);
+    let trial = Trial::new(part, frame, points);
     let taste = |view: &View| {
         let along = view.direction.normalize_or_zero().dot(way);
         let near = view
@@ -69,7 +73,7 @@ pub(super) fn choose(run: &Run, points: &[DVec3]) -> Viewpoint {
         let above = -view.direction.normalize_or_zero().dot(view.up);
         ACROSS * (1.0 - along.abs()) + NEAR * (near + above.signum())
     };
-    let whole = best(open_views(&run.viewing.view, way), |v| {
+    let whole = best(open_views(&viewing.view, way), |v| {
         let bonus = if v.view == own.view { ACCUSTOMED } else { 0.0 };
         trial.seen(v) + taste(&v.view) + bonus
     });
@@ -252,7 +256,7 @@ impl<'a> Trial<'a> {
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 mod tests {
-    use super::super::super::data::Viewing;
+    use super::super::super::data::Run;
     use super::super::super::sample;
     use super::*;
 
@@ -300,7 +304,7 @@ mod tests {
     }
 
     fn chosen(run: &Run) -> (Viewpoint, f64) {
-        let viewpoint = choose(run, &run.part.nodes);
+        let viewpoint = choose(&run.part, &run.frames, &run.viewing, &run.part.nodes);
         let trial = Trial::new(&run.part, &run.frames[0], &run.part.nodes);
         (viewpoint, trial.seen(&viewpoint))
     }

@@ -80,6 +80,7 @@ fn window(
         };
         Hand::new(guided.guide, way)
     });
+    let hand = hand.transpose()?;
     let facts = facts(&ready, &devices);
     // Where columns are fetched, the session's own knows what comes next.
     let shape = ready.shape.get_or_insert(shape);
@@ -238,7 +239,7 @@ mod tests {
         let ui = Ui::new(&mut err, false);
         let mut seen = (0.0_f64, 0.0_f64, 0);
         let code = window(&args, scene, &mut out, &ui, |parts| {
-            let (mut feed, mut hand) = (parts.feed, parts.hand.unwrap());
+            let (mut feed, hand) = (parts.feed, parts.hand.unwrap());
             let begun = Instant::now();
             hand.push_to(0.006);
             while begun.elapsed() < Duration::from_secs(60) && seen.0 < 1.0 {

@@ -11,11 +11,12 @@ use std::time::Duration;
 
 use eframe::egui;
 use eframe::egui_wgpu::RenderState;
+use glam::DVec3;
 
 use super::camera::Camera;
 use super::exhibit::Exhibit;
 use super::hand::Hand;
-use super::scene3d::{Scene3d, Target};
+use super::scene3d::{Samples, Scene3d, Target};
 use super::session::{Feed, Seen};
 use crate::Error;
 pub(crate) use facts::Facts;
@@ -104,11 +105,14 @@ struct Window<'a> {
     exhibit: &'a Exhibit,
     seen: Seen<'a>,
     hand: Option<Hand>,
+    /// Of the hand by keys, world, m/s.
+    velocity: DVec3,
     facts: Facts,
     camera: Option<Camera>,
     render: RenderState,
     scene: Scene3d,
     target: Target,
+    samples: Samples,
     texture: egui::TextureId,
     pace: Pace,
     help: bool,
@@ -126,8 +130,12 @@ impl<'a> Window<'a> {
             hand,
             facts,
         } = parts;
-        let scene = exhibit.scene3d(&render.device, &render.queue);
-        let target = Target::new(&render.device, [1, 1]);
+        let samples = match render.adapter.get_info().device_type {
+            wgpu::DeviceType::Cpu => Samples::One,
+            _ => Samples::Four,
+        };
+        let scene = exhibit.scene3d(&render.device, &render.queue, samples);
+        let target = Target::new(&render.device, [1, 1], samples);
         let texture = render.renderer.write().register_native_texture(
             &render.device,
             target.view(),
@@ -137,11 +145,13 @@ impl<'a> Window<'a> {
             exhibit,
             seen: Seen::new(feed, exhibit),
             hand,
+            velocity: DVec3::ZERO,
             facts,
             camera: None,
             render,
             scene,
             target,
+            samples,
             texture,
             pace: Pace::default(),
             help: false,
@@ -160,10 +170,10 @@ impl<'a> Window<'a> {
         let exhibit = self.exhibit;
         let aspect = f64::from(size[0]) / f64::from(size[1]);
         let mut camera = *self.camera.get_or_insert_with(|| exhibit.camera(aspect));
-        pointer::follow(ui, &response, &mut camera, self.hand.as_mut());
+        pointer::follow(ui, &response, &mut camera, self.hand.as_ref());
         self.camera = Some(camera);
         if self.target.size() != size {
-            self.target = Target::new(&self.render.device, size);
+            self.target = Target::new(&self.render.device, size, self.samples);
             self.render
                 .renderer
                 .write()
@@ -226,8 +236,8 @@ impl<'a> Window<'a> {
             self.saved.ask(ui.ctx());
         }
         let camera = self.camera;
-        if let (Some(hand), Some(camera)) = (&mut self.hand, camera) {
-            pointer::keys(ui, hand, &camera);
+        if let (Some(hand), Some(camera)) = (&self.hand, camera) {
+            pointer::keys(ui, hand, &camera, &mut self.velocity);
         }
     }
 }
@@ -239,10 +249,6 @@ impl eframe::App for Window<'_> {
         }
         let now = ui.input(|i| i.time);
         self.keys(ui);
-        if let Some(hand) = &mut self.hand {
-            // After a standstill the hand goes on from where it is.
-            hand.advance(f64::from(ui.input(|i| i.stable_dt)).min(0.1));
-        }
         self.seen.look(self.exhibit);
         self.seen.told.extend(self.saved.told());
         self.pace.look(now, self.seen.trail.n_periods);

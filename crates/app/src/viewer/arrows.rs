@@ -25,8 +25,8 @@ pub(super) const STICKING: [f32; 3] = [0.0, 0.32, 0.70];
 const N_SIDES: usize = 10;
 
 /// Of the part's size: radius of the shaft, radius and length of the head.
-const SHAFT: f64 = 0.0045;
-const HEAD: [f64; 2] = [0.013, 0.038];
+const SHAFT: f64 = 0.0055;
+const HEAD: [f64; 2] = [0.016, 0.044];
 
 /// Of an arrow, its head at most.
 const HEAD_SHARE: f64 = 0.45;

@@ -7,7 +7,7 @@ use glamx::DPose3;
 use super::arrows::{Force, arrows_into};
 use super::camera::Camera;
 use super::rehearsal::{Place, Rehearsal};
-use super::scene3d::{Moving, Scene3d, Still};
+use super::scene3d::{Moving, Samples, Scene3d, Still};
 use super::skin::{Line, Skin, Vertex};
 use crate::Error;
 use crate::engine::ActiveContact;
@@ -105,7 +105,7 @@ impl Exhibit {
         Ok(exhibit)
     }
 
-    /// Chooses the first view as the report does: from where the contact is seen best when it presses most.
+    /// Chooses the first view: the accustomed one where it shows the contact when it presses most, else the report's.
     fn look_at(
         &mut self,
         scene: &Scene,
@@ -157,7 +157,7 @@ impl Exhibit {
             points.extend(near);
         }
         let viewing = evaluate::viewing(scene, rehearsal.held.way_of_tool(rehearsal.direction));
-        self.view = viewpoint::choose(part, &[frame], &viewing, &points).view;
+        self.view = viewpoint::accustomed_or_best(part, &frame, &viewing, &points);
         self.points = points;
         self.lay_ground((low, high));
         Ok(())
@@ -202,7 +202,12 @@ impl Exhibit {
     }
 
     /// On an adapter.
-    pub(super) fn scene3d(&self, device: &wgpu::Device, queue: &wgpu::Queue) -> Scene3d {
+    pub(super) fn scene3d(
+        &self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        samples: Samples,
+    ) -> Scene3d {
         let still = Still {
             triangles: &self.skin.triangles,
             n_vertices: self.skin.n_vertices(),
@@ -211,7 +216,7 @@ impl Exhibit {
             ground: &self.ground,
         };
         // A pan goes to the side, and the way of a held part takes it along.
-        Scene3d::new(device, queue, &still, 4.0 * self.size)
+        Scene3d::new(device, queue, &still, 4.0 * self.size, samples)
     }
 
     /// A moment, as it is drawn. `displacement`: 3 components for each of the part's rows, m.

@@ -1,14 +1,25 @@
 //! The hand behind mouse, keys and slider: where it wants the handle of a simulated device.
 
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::time::{Duration, Instant};
+
 use device::Guide;
 use glam::DVec3;
 use glamx::DPose3;
+
+use crate::Error;
 
 /// Of the scene's travel, how far the slider goes beyond it.
 const BEYOND: f64 = 1.25;
 
 /// s, that a demonstration rests at the end of the way.
 const REST_S: f64 = 0.6;
+
+/// Time between two moves of the hand.
+const BEAT: Duration = Duration::from_millis(4);
 
 /// What a demonstration is doing.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,31 +45,76 @@ pub(crate) struct Way {
     pub(crate) reach: DVec3,
 }
 
-/// A hand.
+/// What is asked of a hand.
+#[derive(Clone, Copy, Debug)]
+enum Wish {
+    /// To a place along the approach direction, m.
+    PushTo(f64),
+    /// By a way in the world, m.
+    Drag(DVec3),
+    /// Goes on at a velocity, world, m/s; zero stands still.
+    Go(DVec3),
+    Reset,
+    ToggleShow,
+}
+
+/// A hand on a thread of its own, so that it moves evenly however slow the window is; it ends with this.
 pub(crate) struct Hand {
-    guide: Guide,
+    wishes: Sender<Wish>,
     way: Way,
-    /// m, along the direction.
-    push: f64,
-    /// m, across it.
-    aside: DVec3,
-    show: Option<Show>,
+    /// Bits of the m along the approach direction, and whether a demonstration is on.
+    push: Arc<AtomicU64>,
+    shows: Arc<AtomicBool>,
 }
 
 impl Hand {
-    pub(crate) fn new(guide: Guide, way: Way) -> Self {
-        Self {
-            guide,
+    /// # Errors
+    /// A thread that cannot be started.
+    pub(crate) fn new(guide: Guide, way: Way) -> Result<Self, Error> {
+        let (wishes, asked) = channel();
+        let (push, shows) = (Arc::default(), Arc::default());
+        let hand = Self {
+            wishes,
             way,
-            push: 0.0,
-            aside: DVec3::ZERO,
-            show: None,
-        }
+            push: Arc::clone(&push),
+            shows: Arc::clone(&shows),
+        };
+        let mut mover = Mover::new(guide, way);
+        let work = move || {
+            let mut last = Instant::now();
+            loop {
+                match asked.recv_timeout(BEAT) {
+                    Ok(wish) => mover.take(wish),
+                    Err(RecvTimeoutError::Timeout) => {}
+                    Err(RecvTimeoutError::Disconnected) => return,
+                }
+                let now = Instant::now();
+                mover.advance((now - last).as_secs_f64());
+                last = now;
+                push.store(mover.push.to_bits(), Ordering::Relaxed);
+                shows.store(mover.show.is_some(), Ordering::Relaxed);
+            }
+        };
+        std::thread::Builder::new()
+            .name("hand".to_owned())
+            .spawn(work)
+            .map_err(Error::io(Path::new("the hand"), "start the thread of"))?;
+        Ok(hand)
+    }
+
+    fn ask(&self, wish: Wish) {
+        // The thread ends after this only.
+        let _ = self.wishes.send(wish);
     }
 
     /// m, along the approach direction.
     pub(super) fn push(&self) -> f64 {
-        self.push
+        f64::from_bits(self.push.load(Ordering::Relaxed))
+    }
+
+    /// Whether a demonstration is on.
+    pub(super) fn shows(&self) -> bool {
+        self.shows.load(Ordering::Relaxed)
     }
 
     /// m, from 0 to the end of the slider.
@@ -71,14 +127,80 @@ impl Hand {
         self.way.speed
     }
 
+    /// Unit vector of the approach, world.
+    pub(super) fn direction(&self) -> DVec3 {
+        self.way.direction
+    }
+
     /// Goes to a place along the approach direction, m.
-    pub(crate) fn push_to(&mut self, push: f64) {
+    pub(crate) fn push_to(&self, push: f64) {
+        self.ask(Wish::PushTo(push));
+    }
+
+    /// Moves by a way in the world, m.
+    pub(super) fn drag(&self, way: DVec3) {
+        self.ask(Wish::Drag(way));
+    }
+
+    /// Goes on at a velocity, world, m/s, until told otherwise.
+    pub(super) fn go_at(&self, velocity: DVec3) {
+        self.ask(Wish::Go(velocity));
+    }
+
+    /// Back to the start.
+    pub(super) fn reset(&self) {
+        self.ask(Wish::Reset);
+    }
+
+    /// Pushes to the end of the way and pulls back, from the start; ends a demonstration that is on.
+    pub(super) fn toggle_show(&self) {
+        self.ask(Wish::ToggleShow);
+    }
+}
+
+/// Where a hand is, and how it goes on.
+struct Mover {
+    guide: Guide,
+    way: Way,
+    /// m, along the direction.
+    push: f64,
+    /// m, across it.
+    aside: DVec3,
+    show: Option<Show>,
+    /// m/s, world.
+    velocity: DVec3,
+}
+
+impl Mover {
+    fn new(guide: Guide, way: Way) -> Self {
+        Self {
+            guide,
+            way,
+            push: 0.0,
+            aside: DVec3::ZERO,
+            show: None,
+            velocity: DVec3::ZERO,
+        }
+    }
+
+    fn take(&mut self, wish: Wish) {
+        match wish {
+            Wish::PushTo(push) => self.push_to(push),
+            Wish::Drag(way) => self.drag(way),
+            Wish::Go(velocity) => self.velocity = velocity,
+            Wish::Reset => self.reset(),
+            Wish::ToggleShow => self.toggle_show(),
+        }
+    }
+
+    /// Goes to a place along the approach direction, m.
+    fn push_to(&mut self, push: f64) {
         self.show = None;
         self.go(push, self.aside);
     }
 
     /// Moves by a way in the world, m.
-    pub(super) fn drag(&mut self, way: DVec3) {
+    fn drag(&mut self, way: DVec3) {
         self.show = None;
         let along = way.dot(self.way.direction);
         let across = way - along * self.way.direction;
@@ -86,27 +208,25 @@ impl Hand {
     }
 
     /// Back to the start.
-    pub(super) fn reset(&mut self) {
+    fn reset(&mut self) {
         self.show = None;
         self.go(0.0, DVec3::ZERO);
     }
 
-    /// Whether a demonstration is on.
-    pub(super) fn shows(&self) -> bool {
-        self.show.is_some()
-    }
-
     /// Pushes to the end of the way and pulls back, from the start; ends a demonstration that is on.
-    pub(super) fn toggle_show(&mut self) {
+    fn toggle_show(&mut self) {
         if self.show.take().is_none() {
             self.go(0.0, DVec3::ZERO);
             self.show = Some(Show::Push);
         }
     }
 
-    /// Goes on with a demonstration. `elapsed_s`: since the last time.
-    pub(super) fn advance(&mut self, elapsed_s: f64) {
+    /// Goes on. `elapsed_s`: since the last time.
+    fn advance(&mut self, elapsed_s: f64) {
         let step = self.way.speed * elapsed_s;
+        if self.velocity != DVec3::ZERO {
+            self.drag(self.velocity * elapsed_s);
+        }
         match self.show {
             None => {}
             Some(Show::Push) => {
@@ -160,7 +280,7 @@ mod tests {
 
     use super::*;
 
-    fn hand() -> Hand {
+    fn mover() -> Mover {
         let start = DPose3::from_translation(DVec3::new(0.0, 0.014, 0.0));
         let guided = SimulatedHand::guided(HandSettings::default(), start, 1e-3);
         let way = Way {
@@ -170,33 +290,33 @@ mod tests {
             speed: 0.02,
             reach: DVec3::splat(0.05),
         };
-        Hand::new(guided.unwrap().0, way)
+        Mover::new(guided.unwrap().0, way)
     }
 
     #[test]
     fn a_drag_goes_along_and_across_the_way_and_no_further_than_the_device() {
-        let mut hand = hand();
+        let mut hand = mover();
         hand.drag(DVec3::new(0.003, -0.002, 0.0));
-        assert!((hand.push() - 0.002).abs() < 1e-15);
+        assert!((hand.push - 0.002).abs() < 1e-15);
         let target = hand.guide.target().translation;
         assert!((target - DVec3::new(0.003, 0.012, 0.0)).length() < 1e-15);
         hand.drag(DVec3::new(0.0, -9.0, 0.0));
-        assert!((hand.push() - 0.05).abs() < 1e-15);
+        assert!((hand.push - 0.05).abs() < 1e-15);
         hand.drag(DVec3::NAN);
-        assert!((hand.push() - 0.05).abs() < 1e-15);
+        assert!((hand.push - 0.05).abs() < 1e-15);
         hand.reset();
         assert_eq!(hand.guide.target().translation, DVec3::new(0.0, 0.014, 0.0));
     }
 
     #[test]
     fn a_demonstration_goes_in_and_comes_back() {
-        let mut hand = hand();
+        let mut hand = mover();
         hand.toggle_show();
         let mut deepest = 0.0_f64;
         for _ in 0..200 {
             hand.advance(0.016);
-            deepest = deepest.max(hand.push());
+            deepest = deepest.max(hand.push);
         }
-        assert!((deepest - 0.01).abs() < 1e-12 && hand.push() == 0.0 && !hand.shows());
+        assert!((deepest - 0.01).abs() < 1e-12 && hand.push == 0.0 && hand.show.is_none());
     }
 }

@@ -1,7 +1,7 @@
 //! A picture of a moment without a display, on whatever adapter there is.
 
 use super::exhibit::Exhibit;
-use super::scene3d::Target;
+use super::scene3d::{Samples, Target};
 use crate::Error;
 use crate::report::plot::short;
 use crate::report::render::overlay::Overlay;
@@ -63,8 +63,12 @@ pub(crate) fn of_end(
     let last = &exhibit.rehearsal.last;
     let moving = exhibit.place(last, shape)?;
     let camera = exhibit.camera(width as f64 / height as f64);
-    let mut scene = exhibit.scene3d(&adapter.device, &adapter.queue);
-    let target = Target::new(&adapter.device, [width as u32, height as u32]);
+    let mut scene = exhibit.scene3d(&adapter.device, &adapter.queue, Samples::Four);
+    let target = Target::new(
+        &adapter.device,
+        [width as u32, height as u32],
+        Samples::Four,
+    );
     scene.draw(&adapter.device, &adapter.queue, &moving, &camera, &target);
     let pixels = target
         .read(&adapter.device, &adapter.queue)

@@ -11,7 +11,7 @@ use super::camera::Camera;
 use super::skin::{Line, Vertex};
 use crate::report::render::colour;
 use pipelines::Pipelines;
-pub(super) use target::Target;
+pub(super) use target::{Samples, Target};
 
 /// Behind everything.
 pub(super) const BACKGROUND: [f64; 3] = [0.965, 0.97, 0.975];
@@ -100,14 +100,15 @@ pub(super) struct Scene3d {
 }
 
 impl Scene3d {
-    /// `reach`: m, how far the scene goes from the middle of the picture at most.
+    /// `reach`: m, how far the scene goes from the middle of the picture at most. `samples`: as those of its targets.
     pub(super) fn new(
         device: &wgpu::Device,
         queue: &wgpu::Queue,
         still: &Still<'_>,
         reach: f64,
+        samples: Samples,
     ) -> Self {
-        let pipelines = Pipelines::new(device);
+        let pipelines = Pipelines::new(device, samples);
         let view = uniform::<View>(device, "camera");
         let colours = colour_scale(device, queue);
         let view_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
@@ -388,8 +389,8 @@ mod tests {
             up: DVec3::Y,
         };
         let camera = Camera::fit(&look, &part.nodes, 1.5);
-        let target = Target::new(device, SIZE);
-        let mut scene = Scene3d::new(device, queue, &still, 0.1);
+        let target = Target::new(device, SIZE, Samples::Four);
+        let mut scene = Scene3d::new(device, queue, &still, 0.1, Samples::Four);
         scene.draw(device, queue, &moving, &camera, &target);
         (camera, target.read(device, queue).unwrap())
     }

@@ -89,6 +89,24 @@ pub(crate) fn choose(
     }
 }
 
+/// The accustomed view, or the one that was asked for, where it shows enough of the contact, and else as [`choose`]; never cut open.
+#[cfg(feature = "viewer")]
+pub(crate) fn accustomed_or_best(
+    part: &PartDrawing,
+    frame: &Frame,
+    viewing: &Viewing,
+    points: &[DVec3],
+) -> View {
+    let own = Viewpoint {
+        view: viewing.view,
+        cut: None,
+    };
+    if Trial::new(part, frame, points).seen(&own) >= ENOUGH {
+        return own.view;
+    }
+    choose(part, std::slice::from_ref(frame), viewing, points).view
+}
+
 /// The first of those with the highest mark.
 fn best(views: Vec<Viewpoint>, mark: impl Fn(&Viewpoint) -> f64) -> Option<Viewpoint> {
     let mut best: Option<(Viewpoint, f64)> = None;

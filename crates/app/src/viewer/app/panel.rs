@@ -64,10 +64,10 @@ impl Window<'_> {
         let felt = PlotPoints::Borrowed(self.seen.trail.points());
         let sample = self.seen.sample.as_ref();
         let here = sample.map(|s| [1e3 * s.gone.travel, s.resistance]);
-        let height = (ui.available_height() - 330.0).clamp(170.0, 330.0);
+        let height = (ui.available_height() - 400.0).clamp(170.0, 330.0);
         Plot::new("force against travel")
             .height(height)
-            .legend(Legend::default().position(Corner::LeftTop))
+            .legend(Legend::default().position(Corner::RightTop))
             .x_axis_label("travel, mm")
             .y_axis_label("force, N")
             .allow_scroll(false)
@@ -75,19 +75,20 @@ impl Window<'_> {
             .allow_zoom(false)
             .allow_boxed_zoom(false)
             .include_y(0.0)
+            .grid_spacing(egui::Rangef::new(5.0, 120.0))
             .show(ui, |plot| {
                 let own = Line::new("the part's own curve", PlotPoints::Owned(own));
                 plot.line(own.color(OWN).width(1.5));
                 plot.line(Line::new("felt", felt).color(FELT).width(2.5));
                 if let Some(here) = here {
-                    let now = Points::new("now", here);
+                    let now = Points::new("", here);
                     plot.points(now.color(FELT).radius(5.0));
                 }
             });
     }
 
     fn hand(&mut self, ui: &mut egui::Ui) {
-        let Some(hand) = &mut self.hand else {
+        let Some(hand) = &self.hand else {
             ui.label(format!("Held by {}.", self.facts.device));
             return;
         };

@@ -22,7 +22,7 @@ const SLOW: f64 = 0.25;
 const POINTS_PER_NOTCH: f64 = 50.0;
 
 /// Turns, moves and zooms the camera, or moves the tool.
-pub(super) fn follow(ui: &Ui, response: &Response, camera: &mut Camera, hand: Option<&mut Hand>) {
+pub(super) fn follow(ui: &Ui, response: &Response, camera: &mut Camera, hand: Option<&Hand>) {
     let height = f64::from(response.rect.height()).max(1.0);
     let in_heights = |v: egui::Vec2| DVec2::new(f64::from(v.x), f64::from(v.y)) / height;
     let modifiers = ui.input(|i| i.modifiers);
@@ -67,20 +67,24 @@ fn wheel(ui: &Ui) -> f64 {
     })
 }
 
-/// Keys that move the tool.
-pub(super) fn keys(ui: &Ui, hand: &mut Hand, camera: &Camera) {
-    let (elapsed_s, modifiers) = ui.input(|i| (f64::from(i.stable_dt).min(0.1), i.modifiers));
+/// Keys that move the tool. `last`: the velocity that was asked for, world, m/s.
+pub(super) fn keys(ui: &Ui, hand: &Hand, camera: &Camera, last: &mut DVec3) {
+    let modifiers = ui.input(|i| i.modifiers);
     let down = |key: Key| f64::from(u8::from(ui.input(|i| i.key_down(key))));
     let space = if modifiers.shift { -1.0 } else { 1.0 } * down(Key::Space);
     let along = space + SLOW * (down(Key::ArrowUp) - down(Key::ArrowDown));
     let aside = SLOW * (down(Key::ArrowRight) - down(Key::ArrowLeft));
-    let step = hand.speed() * elapsed_s;
-    if along != 0.0 {
-        hand.push_to((hand.push() + along * step).max(0.0));
-    }
-    if aside != 0.0 {
-        let right = camera.in_plane(DVec2::X).normalize_or(DVec3::X);
-        hand.drag(right * (aside * step));
+    let right = camera.in_plane(DVec2::X).normalize_or(DVec3::X);
+    // Nothing is gained by pulling further than to the start.
+    let along = if hand.push() <= 0.0 {
+        along.max(0.0)
+    } else {
+        along
+    };
+    let velocity = hand.speed() * (along * hand.direction() + aside * right);
+    if velocity != *last {
+        hand.go_at(velocity);
+        *last = velocity;
     }
     let pressed = |key: Key| ui.input(|i| i.key_pressed(key));
     if pressed(Key::P) {

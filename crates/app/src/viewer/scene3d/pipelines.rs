@@ -1,7 +1,7 @@
 //! How each kind of thing is drawn.
 
 use super::super::skin::{Line, Vertex};
-use super::target::{COLOUR, DEPTH, SAMPLES};
+use super::target::{COLOUR, DEPTH, Samples};
 
 /// One for each kind, and what they are given.
 pub(super) struct Pipelines {
@@ -27,7 +27,7 @@ struct Kind {
 }
 
 impl Pipelines {
-    pub(super) fn new(device: &wgpu::Device) -> Self {
+    pub(super) fn new(device: &wgpu::Device, samples: Samples) -> Self {
         let shader = device.create_shader_module(wgpu::include_wgsl!("../scene3d.wgsl"));
         let view_layout = layout(
             device,
@@ -55,7 +55,7 @@ impl Pipelines {
             cull: Some(cull),
             ..lit(name, "fragment_glass")
         };
-        let make = |kind: Kind| kind.pipeline(device, &all, &shader);
+        let make = |kind: Kind| kind.pipeline(device, &all, &shader, samples);
         Self {
             part: make(lit("part", "fragment_part")),
             solid: make(lit("forces", "fragment_solid")),
@@ -84,6 +84,7 @@ impl Kind {
         device: &wgpu::Device,
         layout: &wgpu::PipelineLayout,
         shader: &wgpu::ShaderModule,
+        samples: Samples,
     ) -> wgpu::RenderPipeline {
         let vertices = if self.vertex == "vertex_line" {
             wgpu::VertexBufferLayout {
@@ -119,7 +120,7 @@ impl Kind {
                 bias: wgpu::DepthBiasState::default(),
             }),
             multisample: wgpu::MultisampleState {
-                count: SAMPLES,
+                count: samples.count(),
                 ..wgpu::MultisampleState::default()
             },
             fragment: Some(wgpu::FragmentState {

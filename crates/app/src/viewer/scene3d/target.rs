@@ -5,11 +5,26 @@ use super::BACKGROUND;
 pub(super) const COLOUR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 pub(super) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
-/// Samples per pixel: what every adapter has.
-pub(super) const SAMPLES: u32 = 4;
-
 /// Bytes of a row in a buffer are a multiple of this.
 const ROW: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT;
+
+/// Samples per pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::viewer) enum Samples {
+    /// Edges have steps; for a processor that plays an adapter, which is twice as fast so.
+    One,
+    /// Smooth edges; what every adapter has.
+    Four,
+}
+
+impl Samples {
+    pub(super) fn count(self) -> u32 {
+        match self {
+            Self::One => 1,
+            Self::Four => 4,
+        }
+    }
+}
 
 /// A picture on the adapter.
 pub(in crate::viewer) struct Target {
@@ -17,11 +32,13 @@ pub(in crate::viewer) struct Target {
     depth: wgpu::TextureView,
     picture: wgpu::Texture,
     view: wgpu::TextureView,
+    has_samples: bool,
 }
 
 impl Target {
     /// Of a size in pixels, each at least 1.
-    pub(in crate::viewer) fn new(device: &wgpu::Device, size: [u32; 2]) -> Self {
+    pub(in crate::viewer) fn new(device: &wgpu::Device, size: [u32; 2], samples: Samples) -> Self {
+        let n_samples = samples.count();
         let texture = |name, format, sample_count, usage| {
             device.create_texture(&wgpu::TextureDescriptor {
                 label: Some(name),
@@ -48,10 +65,11 @@ impl Target {
             attached | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC,
         );
         Self {
-            samples: view(&texture("samples", COLOUR, SAMPLES, attached)),
-            depth: view(&texture("depth", DEPTH, SAMPLES, attached)),
+            samples: view(&texture("samples", COLOUR, n_samples, attached)),
+            depth: view(&texture("depth", DEPTH, n_samples, attached)),
             view: view(&picture),
             picture,
+            has_samples: n_samples > 1,
         }
     }
 
@@ -68,15 +86,20 @@ impl Target {
     /// A pass that begins with the background.
     pub(super) fn begin<'e>(&self, encoder: &'e mut wgpu::CommandEncoder) -> wgpu::RenderPass<'e> {
         let [r, g, b] = BACKGROUND;
+        let (view, resolve_target, store) = if self.has_samples {
+            (&self.samples, Some(&self.view), wgpu::StoreOp::Discard)
+        } else {
+            (&self.view, None, wgpu::StoreOp::Store)
+        };
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("scene"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &self.samples,
+                view,
                 depth_slice: None,
-                resolve_target: Some(&self.view),
+                resolve_target,
                 ops: wgpu::Operations {
                     load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }),
-                    store: wgpu::StoreOp::Discard,
+                    store,
                 },
             })],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {

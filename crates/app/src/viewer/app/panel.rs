@@ -1,7 +1,7 @@
 //! The panel beside the picture: force, curve, hand, and how the loop is doing.
 
 use eframe::egui::{self, Color32, RichText};
-use egui_plot::{Corner, Legend, Line, Plot, PlotPoint, PlotPoints, Points};
+use egui_plot::{Line, Plot, PlotPoint, PlotPoints, Points};
 
 use super::Window;
 
@@ -29,8 +29,9 @@ impl Window<'_> {
 
     fn numbers(&self, ui: &mut egui::Ui) {
         let sample = self.seen.sample.as_ref();
-        let (force, travel) =
-            sample.map_or((0.0, 0.0), |s| (s.resistance + 0.0, 1e3 * s.gone.travel));
+        let (force, travel) = sample.map_or((0.0, 0.0), |s| (s.resistance, 1e3 * s.gone.travel));
+        // No sign of a zero.
+        let shown = |value: f64| if value.abs() < 0.005 { 0.0 } else { value };
         let large = |text: String| RichText::new(text).size(30.0).strong();
         egui::Grid::new("numbers")
             .num_columns(2)
@@ -39,8 +40,8 @@ impl Window<'_> {
                 ui.label("force against the hand");
                 ui.label("travel");
                 ui.end_row();
-                ui.label(large(format!("{force:.2} N")));
-                ui.label(large(format!("{travel:.2} mm")));
+                ui.label(large(format!("{:.2} N", shown(force))));
+                ui.label(large(format!("{:.2} mm", shown(travel))));
                 ui.end_row();
             });
         let snap = &self.seen.snap;
@@ -65,9 +66,13 @@ impl Window<'_> {
         let sample = self.seen.sample.as_ref();
         let here = sample.map(|s| [1e3 * s.gone.travel, s.resistance]);
         let height = (ui.available_height() - 400.0).clamp(170.0, 330.0);
+        ui.horizontal(|ui| {
+            ui.colored_label(FELT, "— felt by the hand");
+            ui.colored_label(OWN, "— the part's own curve, on the way in");
+        });
         Plot::new("force against travel")
             .height(height)
-            .legend(Legend::default().position(Corner::RightTop))
+            .grid_color(Color32::from_gray(185))
             .x_axis_label("travel, mm")
             .y_axis_label("force, N")
             .allow_scroll(false)

@@ -77,7 +77,10 @@ fn no_window(error: &eframe::Error) -> Error {
              --screenshot FILE --at TRAVEL draws it"
         }
     };
-    Error::Input(format!("the window cannot be opened: {error}; {mend}"))
+    // The last part is the reason; before it stand places in others' sources.
+    let words = error.to_string();
+    let why = words.rsplit(": ").next().unwrap_or(&words);
+    Error::Input(format!("the window cannot be opened: {why}; {mend}"))
 }
 
 /// Light, and large enough to read.

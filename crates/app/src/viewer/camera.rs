@@ -117,7 +117,7 @@ impl Camera {
     }
 
     /// Towards a light over the eye's left shoulder, unit vector.
-    pub(super) fn to_light(&self) -> DVec3 {
+    pub(super) fn to_light(self) -> DVec3 {
         (self.up * 0.55 - self.right * 0.45 - self.into).normalize()
     }
 

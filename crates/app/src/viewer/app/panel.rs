@@ -67,8 +67,8 @@ impl Window<'_> {
         let here = sample.map(|s| [1e3 * s.gone.travel, s.resistance]);
         let height = (ui.available_height() - 400.0).clamp(170.0, 330.0);
         ui.horizontal(|ui| {
-            ui.colored_label(FELT, "— felt by the hand");
-            ui.colored_label(OWN, "— the part's own curve, on the way in");
+            ui.colored_label(FELT, "— felt");
+            ui.colored_label(OWN, "— the part's own curve");
         });
         Plot::new("force against travel")
             .height(height)

@@ -11,7 +11,7 @@ const ROW: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT;
 /// Samples per pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::viewer) enum Samples {
-    /// Edges have steps; for a processor that plays an adapter, which is twice as fast so.
+    /// Edges have steps; for a processor that plays an adapter, which has less to do so.
     One,
     /// Smooth edges; what every adapter has.
     Four,

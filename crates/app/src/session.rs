@@ -30,12 +30,14 @@ mod snap;
 mod tangent;
 mod watch;
 
+use std::path::Path;
+use std::sync::mpsc::channel;
 use std::time::Instant;
 
 use device::driver::simulated::Model;
 use device::{
-    AsFastAsPossible, Clock, HandSettings, HapticDevice, Insertion, RealTime, Script, Servo,
-    ServoSettings, Simulated, SimulatedHand, SimulatedSettings,
+    AsFastAsPossible, Clock, HandSettings, HapticDevice, Insertion, RealTime, Realtime, Script,
+    Servo, ServoSettings, Simulated, SimulatedHand, SimulatedSettings,
 };
 use fem::Mesh;
 use glam::DVec3;
@@ -147,14 +149,22 @@ pub fn run(
         let mut servo = Servo::new(RealTime::new(spec.period_s)?, settings)?;
         let (viewer, view) = snapshots(engine.settings().max_contacts);
         session.course.ports.viewer = Some(viewer);
+        let (granted, granted_by_system) = channel();
+        session.at_start = Some(Box::new(move || {
+            // Nobody listens where the session ended at once.
+            let _ = granted.send(Realtime::ask());
+        }));
         // The display has a thread of its own; there it may be late.
-        let (seen, two) = watch::beside(view, shape, || match every {
-            None => session.one_rate(&mut servo, engine, None).map(|()| None),
-            Some(_) => session.two_rates_beside(&mut servo, engine, fast).map(Some),
+        let (seen, two) = watch::beside(view, shape, || {
+            on_own_thread(|| match every {
+                None => session.one_rate(&mut servo, engine, None).map(|()| None),
+                Some(_) => session.two_rates_beside(&mut servo, engine, fast).map(Some),
+            })
         })?;
         drop(session);
         recording.servo = servo.report();
         recording.two_rates = two;
+        recording.granted = granted_by_system.try_recv().ok();
         seen.note(&mut recording);
     } else {
         let mut servo = Servo::new(AsFastAsPossible::new(spec.period_s)?, settings)?;
@@ -172,6 +182,21 @@ pub fn run(
     }
     recording.device = device.events();
     Ok(recording)
+}
+
+/// Real-time priority is the loop's thread's alone; the rest of the program goes on as it was.
+fn on_own_thread<T: Send>(work: impl FnOnce() -> Result<T, Error> + Send) -> Result<T, Error> {
+    std::thread::scope(|scope| {
+        let thread = std::thread::Builder::new().name("haptic loop".to_owned());
+        let haptic = thread.spawn_scoped(scope, work).map_err(Error::io(
+            Path::new("the haptic loop"),
+            "start the thread of",
+        ))?;
+        // A fault in it is told as one of this thread.
+        haptic
+            .join()
+            .unwrap_or_else(|fault| std::panic::resume_unwind(fault))
+    })
 }
 
 /// A session that goes on.

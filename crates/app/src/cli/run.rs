@@ -133,6 +133,9 @@ fn feel(
     if spec.real_time || recording.two_rates.is_some() {
         ui.note(&recording.rates.words());
     }
+    if let Some(granted) = &recording.granted {
+        ui.note(&granted.to_string());
+    }
     Ok(Some(Session {
         recording,
         shape,

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use device::{Phase, ServoReport, SimulatedEvents, Wrench};
+use device::{Phase, Realtime, ServoReport, SimulatedEvents, Wrench};
 use glam::DVec3;
 use glamx::DPose3;
 
@@ -48,6 +48,8 @@ pub struct Recording {
     pub direction: DVec3,
     /// Periods, misses and times of the loop.
     pub servo: ServoReport,
+    /// What the system granted a loop in real time.
+    pub granted: Option<Realtime>,
     /// What the simulated hardware limited.
     pub device: SimulatedEvents,
     /// Largest displacement of a surface node, m, seen at display rate.
@@ -78,11 +80,12 @@ impl Recording {
         rates: ChosenRates,
     ) -> Self {
         /// Contacts in all: the system gives memory as it is written to, and no scene comes near.
-        const MOST: usize = 1 << 22;
+        const MOST: usize = 1 << 20;
         Self {
             records: Vec::with_capacity(n_records),
             direction: direction.normalize(),
             servo: ServoReport::default(),
+            granted: None,
             device: SimulatedEvents::default(),
             max_surface_displacement: 0.0,
             rates,

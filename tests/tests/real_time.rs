@@ -259,6 +259,7 @@ fn no_period_of_a_live_session_allocates() {
             mapping: Some(Mapping::new(MappingSettings::default(), held.start()).unwrap()),
             clutch: 0,
             slips: false,
+            rail: None,
             largest_force: 14.0,
             stiffness: 2e4,
             n_periods: Some(n_periods),

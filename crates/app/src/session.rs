@@ -139,6 +139,7 @@ pub fn run(
             mapped: None,
             other: None,
             saturation: None,
+            rail: None,
             drive: Drive::Scripted { script, n_periods },
             ports: Ports::recording(&mut recording),
         },

@@ -13,6 +13,7 @@ use contact::tool::{
 use device::driver::simulated::Model;
 use device::{HandSettings, VirtualCoupling};
 use fem::{Material, Quadrature};
+use glam::DVec3;
 
 use crate::Error;
 use crate::drive::DriveSpec;
@@ -208,6 +209,28 @@ pub fn engine(scene: &Scene, prepared: &PreparedPart, tool: Tool) -> Result<Engi
     let coupling = Some(coupling(scene)?);
     let plan = plan(scene, prepared, tool, coupling, scene.accuracy.max_contacts)?;
     built(scene, plan)
+}
+
+/// The engine of a live session: as that of a script, but a half or quarter of a part keeps the held body on its axis.
+///
+/// # Errors
+/// As [`engine`].
+pub fn live_engine(scene: &Scene, prepared: &PreparedPart, tool: Tool) -> Result<Engine, Error> {
+    let rail = live_rail(scene);
+    let held = held(scene, prepared, &tool);
+    let coupling = Some(coupling(scene)?);
+    let plan = plan(scene, prepared, tool, coupling, scene.accuracy.max_contacts)?;
+    let rail = rail.map(|direction| held.way_of_tool(direction));
+    built(scene, Plan { rail, ..plan })
+}
+
+/// Unit, world: the axis that a held body stays on in a live session. A part that is held in some directions alone is
+/// cut at a plane of symmetry; what the other half would balance pushes the tool aside, and no hand is there for it.
+pub fn live_rail(scene: &Scene) -> Option<DVec3> {
+    let mut fixed = scene.part.fixed.iter();
+    let is_cut = fixed.any(|group| group.components != [true; 3]);
+    let is_guided = scene.drive.guide == scene::Guide::Axis;
+    (is_cut && is_guided).then_some(scene.drive.direction)
 }
 
 /// The engine of the part's own curve: the tool's pose is imposed, or guided along the direction. `max_contacts`: rows of

@@ -479,3 +479,35 @@ fn ctrl_c_ends_a_live_session_well() {
     assert!(read.is_whole);
     assert_eq!(told["recorded_steps"], read.messages.len());
 }
+
+/// Half of a part pushes the tool aside, which the other half would balance: a hand feels the curve of a testing machine
+/// all the same.
+#[test]
+fn a_live_session_of_half_a_part_keeps_the_tool_on_its_axis() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = scene().with_file_name("cable.toml");
+    let scene = scene.to_str().unwrap();
+    let told = |args: &[&str]| -> serde_json::Value {
+        let output = run(dir.path(), args);
+        let err = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{err}");
+        serde_json::from_slice(&output.stdout).unwrap()
+    };
+    let peak = |told: &serde_json::Value| told["peak_insertion_force_N"].as_f64().unwrap();
+    let machine = told(&["run", scene, "--json"]);
+    let felt = told(&["live", scene, "--json"]);
+    assert_eq!(felt["snaps_in"], 1, "{felt}");
+    let (felt, machine) = (peak(&felt), peak(&machine));
+    assert!(
+        (felt / machine - 1.0).abs() < 0.02,
+        "{felt} and {machine} N"
+    );
+    let two = [
+        "live",
+        scene,
+        "--second-device",
+        "simulated",
+        "--no-recording",
+    ];
+    assert_eq!(run(dir.path(), &two).status.code(), Some(2));
+}

@@ -78,6 +78,7 @@ impl Clip {
             mapping: None,
             clutch: 0,
             slips: false,
+            rail: None,
             largest_force: 14.0,
             stiffness: 2e4,
             n_periods: None,

@@ -40,6 +40,7 @@ impl Engine {
             coupling,
             grip,
             guide,
+            rail,
             places,
             features,
             friction,
@@ -82,7 +83,11 @@ impl Engine {
         let held = Held::by(coupling).at(grip);
         Ok(Self {
             reach_of_rotation: tool.characteristic_size().min(extent(&part)),
-            held: guide.map_or(held, |direction| held.guided_along(direction)),
+            held: match (guide, rail) {
+                (Some(direction), _) => held.guided_along(direction),
+                (None, Some(direction)) => held.on_rail(direction),
+                (None, None) => held,
+            },
             near: Near {
                 watch: Watch::new(
                     &part,

@@ -69,6 +69,26 @@ impl Held {
         }
     }
 
+    /// Leaves the coupling's compliance along a direction of unit length alone: a tool on a rail, with a spring along it.
+    pub(super) fn on_rail(self, direction: DVec3) -> Self {
+        let compliance = self.compliance.map(|compliance| {
+            // The coupling is isotropic.
+            let isotropic = compliance[0][0];
+            let mut along = [[0.0; 6]; 6];
+            for i in 0..3 {
+                for j in 0..3 {
+                    along[i][j] = isotropic * direction[i] * direction[j];
+                }
+            }
+            along
+        });
+        Self {
+            compliance,
+            is_guided: compliance.is_some(),
+            ..self
+        }
+    }
+
     pub(super) fn coupling(&self) -> Option<&VirtualCoupling> {
         self.coupling.as_ref()
     }
@@ -225,6 +245,16 @@ mod tests {
                 assert!((on_tool + from_contact).abs() < 1e-10);
             }
         }
+    }
+
+    #[test]
+    fn a_tool_on_a_rail_gives_way_along_it_only() {
+        let along = DVec3::new(1.0, 2.0, -2.0) / 3.0;
+        let held = Held::by(VirtualCoupling::new(1e4, 20.0).ok()).on_rail(along);
+        let e = held.deviation_under(&[5.0, 0.0, 0.0, 0.0, 0.1, 0.0]);
+        let moved = DVec3::new(e[0], e[1], e[2]);
+        assert!((moved - along * (along.x * 5e-4)).length() < 1e-18);
+        assert_eq!([e[3], e[4], e[5]], [0.0; 3]);
     }
 
     #[test]

@@ -69,6 +69,8 @@ pub struct Plan {
     pub grip: Grip,
     /// Unit, part's frame: along it the tool's place is imposed, whatever the coupling does across it.
     pub guide: Option<DVec3>,
+    /// Unit, part's frame: the coupling is a spring along it, and all else of the tool's pose is imposed.
+    pub rail: Option<DVec3>,
     /// Where contact acts.
     pub places: ContactPlaces,
     /// Corners and edges of the tool, that touch these faces between the nodes.
@@ -93,6 +95,7 @@ impl Plan {
             coupling,
             grip: Grip::OnTool(DVec3::ZERO),
             guide: None,
+            rail: None,
             places: ContactPlaces::Nodes,
             features: None,
             friction: None,

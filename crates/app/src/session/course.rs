@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use device::{Command, HandleState, Mapping, Wrench};
+use glam::DVec3;
 use glamx::DPose3;
 
 use super::Held;
@@ -23,6 +24,8 @@ pub(super) struct Course<'a> {
     pub(super) other: Option<Other<'a>>,
     /// The most that the hand can ask for; `None`: whatever its script says.
     pub(super) saturation: Option<Saturation>,
+    /// Unit, world: the axis that the held body stays on; the hand feels what is along it.
+    pub(super) rail: Option<DVec3>,
     pub(super) drive: Drive<'a>,
     pub(super) ports: Ports<'a>,
 }
@@ -54,6 +57,14 @@ impl Course<'_> {
         if let Some(saturation) = &self.saturation {
             handle.pose.translation -= saturation.excess();
         }
+        if let Some(along) = self.rail {
+            let start = self.held.start();
+            let way = handle.pose.translation - start.translation;
+            handle.pose = DPose3 {
+                translation: start.translation + along * way.dot(along),
+                ..start
+            };
+        }
         handle
     }
 
@@ -67,9 +78,13 @@ impl Course<'_> {
 
     /// On the handle about its point, world.
     pub(super) fn wrench_on_handle(&self, handle: &HandleState, report: &StepReport) -> Wrench {
-        match &self.other {
+        let wrench = match &self.other {
             None => self.held.wrench_on_handle(&handle.pose, report),
             Some(other) => other.wrenches(&self.held, &handle.pose, report).0,
+        };
+        match self.rail {
+            None => wrench,
+            Some(along) => Wrench::new(along * wrench.force.dot(along), DVec3::ZERO),
         }
     }
 

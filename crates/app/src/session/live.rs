@@ -4,6 +4,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use device::{Clock, HapticDevice, Mapping, RealTime, Servo, ServoReport, ServoSettings};
+use glam::DVec3;
 
 use super::course::{Course, Mapped};
 use super::drive::{Drive, Heading};
@@ -44,6 +45,8 @@ pub struct LiveSpec {
     pub n_periods: Option<u64>,
     /// s by the clock at most.
     pub seconds: Option<f64>,
+    /// Unit, world: the axis that the held body stays on ([`crate::setup::live_rail`]).
+    pub rail: Option<DVec3>,
     /// N/m, of the coupling along a way.
     pub stiffness: f64,
     /// m, divides torques to compare them with forces.
@@ -175,6 +178,7 @@ pub fn run_on<'a, 'h: 'a, C: Clock>(
             }),
             other: other.transpose()?,
             saturation: Some(Saturation::new(spec.largest_force, spec.stiffness)),
+            rail: spec.rail,
             drive: Drive::Live {
                 stop,
                 n_periods: spec.n_periods,

@@ -97,6 +97,7 @@ fn run_with(
             mapped: None,
             other: None,
             saturation: None,
+            rail: None,
             drive: Drive::Scripted {
                 script,
                 n_periods: N_PERIODS,

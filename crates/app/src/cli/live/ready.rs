@@ -101,6 +101,13 @@ impl Ready {
     ) -> Result<Self, Error> {
         let limits = first.limits(args.max_force)?;
         let other = loaded.other();
+        if setup::live_rail(&loaded.scene).is_some() && args.second_device.is_some() {
+            return Err(Error::Input(format!(
+                "{}: the part is cut at a plane of symmetry, so the tool stays on its axis and one hand moves it: leave \
+                 --second-device out",
+                loaded.scene.path.display()
+            )));
+        }
         let Loaded {
             scene,
             prepared,
@@ -109,7 +116,7 @@ impl Ready {
             options,
         } = loaded;
         let (scene, coupling) = open::coupled(scene, &limits, session.period_s)?;
-        let mut engine = setup::engine(&scene, &prepared, tool)?;
+        let mut engine = setup::live_engine(&scene, &prepared, tool)?;
         let rates = live::rates(&session, &prepared, &mut engine)?;
         let shape = match &prepared.compliance {
             PreparedCompliance::All(_) => None,
@@ -126,6 +133,7 @@ impl Ready {
             mapping: first.mapping(args.axes, args.scale, session.held)?,
             clutch: args.clutch.map_or(0, |button| 1 << (button - 1)),
             slips: first.is_rate,
+            rail: setup::live_rail(&scene),
             largest_force: live::largest_force(&session, &mut engine),
             stiffness: scene.coupling.translational_stiffness,
             lever: part_extent(&prepared.loaded.mesh),

@@ -129,15 +129,6 @@ impl Told<'_> {
                 ));
             }
         }
-        let mut fixed = self.ready.scene.part.fixed.iter();
-        if fixed.any(|group| group.components != [true; 3]) {
-            warnings.push(
-                "warning: the part is held in some directions alone, as at a plane of symmetry, and a hand is guided by \
-                 nothing: a half or quarter of a part pushes the tool aside, and its forces here are not those of the whole \
-                 (`snapin run` guides the body along its axis)"
-                    .to_owned(),
-            );
-        }
         warnings
     }
 

@@ -22,8 +22,11 @@ const FAILURES_MAX: u32 = 100;
 /// Time between two tries to open a lost link, s.
 const RETRY_S: f64 = 1.0;
 
-/// Time between two messages about failures, s.
+/// Time between two messages with the same words about failures, s.
 const RETELL_S: f64 = 10.0;
+
+/// Different words that are remembered; more in that time are not told.
+const WORDS_MAX: usize = 16;
 
 /// Longest wait for the link's thread at the end, s: a library that hangs must not hold the program.
 const JOIN_S: f64 = 1.0;
@@ -249,7 +252,7 @@ impl<F: FnMut() -> Result<Connected, Unavailable>> Worker<F> {
     fn serve(&mut self, name: &str, link: &mut dyn Link) -> Option<DeviceError> {
         let fade = Watchdog::for_link();
         let mut failures = 0;
-        let mut told: Option<Instant> = None;
+        let mut told = Told::default();
         while !self.quit.load(Ordering::Acquire) {
             let wanted = *self.wanted.read();
             let age_s = wanted.at.elapsed().as_secs_f64();
@@ -277,10 +280,9 @@ impl<F: FnMut() -> Result<Connected, Unavailable>> Worker<F> {
                     if failures >= FAILURES_MAX || matches!(error, DeviceError::Gone { .. }) {
                         return Some(error);
                     }
-                    // A link that fails every other time must not fill the memory with its messages.
-                    if told.is_none_or(|at| at.elapsed().as_secs_f64() > RETELL_S) {
-                        self.say(format!("{name}: {error}"));
-                        told = Some(Instant::now());
+                    let text = format!("{name}: {error}");
+                    if failures == 1 && told.is_news(&text) {
+                        self.say(text);
                     }
                     std::thread::sleep(Duration::from_millis(1));
                 }
@@ -308,6 +310,23 @@ impl<F: FnMut() -> Result<Connected, Unavailable>> Worker<F> {
 
     fn say(&self, message: String) {
         let _nobody_listens = self.tell.send(message);
+    }
+}
+
+/// What was told of failures: a link that fails every other time must not fill the memory with its messages.
+#[derive(Debug, Default)]
+struct Told(Vec<(String, Instant)>);
+
+impl Told {
+    fn is_news(&mut self, text: &str) -> bool {
+        self.0
+            .retain(|(_, at)| at.elapsed().as_secs_f64() <= RETELL_S);
+        let is_known = self.0.iter().any(|(known, _)| known == text);
+        if is_known || self.0.len() >= WORDS_MAX {
+            return false;
+        }
+        self.0.push((text.to_owned(), Instant::now()));
+        true
     }
 }
 

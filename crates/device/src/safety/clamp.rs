@@ -59,6 +59,17 @@ mod tests {
         let wanted = Wrench::new(DVec3::splat(1e-300), DVec3::splat(1e300));
         assert_eq!(clamp.pass(&wanted, &mut events), Wrench::ZERO);
         assert_eq!(clamp.pass(&Wrench::ZERO, &mut events), Wrench::ZERO);
+        // Such a device feels nothing; that it does is no event.
+        assert_eq!(events.wrenches_clamped, 0);
+        let force_alone = NormClamp {
+            force_max: 1.0,
+            ..clamp
+        };
+        let torque = Wrench::new(DVec3::ZERO, DVec3::X);
+        assert_eq!(force_alone.pass(&torque, &mut events), Wrench::ZERO);
+        assert_eq!(events.wrenches_clamped, 0);
+        let beyond = Wrench::new(DVec3::X * 2.0, DVec3::X);
+        assert_eq!(force_alone.pass(&beyond, &mut events).force, DVec3::X);
         assert_eq!(events.wrenches_clamped, 1);
     }
 }

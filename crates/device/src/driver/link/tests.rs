@@ -172,3 +172,13 @@ fn command_that_is_not_finite_is_refused_before_the_link() {
     wait_until(|| with(&bench, |b| b.rendered.len() > 5));
     assert!(with(&bench, |b| b.rendered.iter().all(|x| *x == 0.0)));
 }
+
+#[test]
+fn the_same_words_are_told_once_and_many_different_ones_have_an_end() {
+    let mut told = Told::default();
+    assert!(told.is_news("no answer"));
+    assert!(!told.is_news("no answer"));
+    assert!(told.is_news("another"));
+    let more = (0..1000).filter(|k| told.is_news(&format!("{k}"))).count();
+    assert_eq!(more, WORDS_MAX - 2);
+}

@@ -29,6 +29,7 @@ use contact::tool::Tool;
 use contact::{Contact, Place, wrench_on_tool};
 use glam::{DMat3, DVec3};
 use glamx::DPose3;
+use std::time::Instant;
 
 use super::forces::Loads;
 use super::held::Held;
@@ -67,6 +68,8 @@ pub struct FrozenProblem {
     yields: Vec<f64>,
     q_frozen: Vec<f64>,
     law: Law,
+    /// When an answer with friction ends as it is then.
+    deadline: Option<Instant>,
     /// N, by row, on the part, at the step's own target.
     forces_frozen: Vec<DVec3>,
     /// Of the last answer, by row.
@@ -121,6 +124,12 @@ impl FrozenProblem {
     /// Keeps the planes of the step in the solves that follow, whatever their number.
     pub fn keep_planes(&mut self) {
         self.most_passes = 0;
+    }
+
+    /// From now on an answer with friction that is not found by then is the best one found, flagged. `None`: without an
+    /// end, and the same each time.
+    pub fn answer_by(&mut self, deadline: Option<Instant>) {
+        self.deadline = deadline;
     }
 
     /// Equilibrium for a target (part's frame), from the answer before.
@@ -212,7 +221,7 @@ impl FrozenProblem {
             ..self.step
         };
         self.law
-            .solve(&self.contacts, &mut self.forces, &mut report);
+            .solve(&self.contacts, &mut self.forces, &mut report, self.deadline);
         self.conclude(target, report)
     }
 

@@ -28,7 +28,7 @@ impl Session<'_> {
         let mut first = slow::empty(engine);
         solve_and_freeze(engine, 0, &start, &start, &mut first);
         let boxes = std::array::from_fn(|_| slow::empty(engine));
-        let fast = FastLoop::new(first, settings)?;
+        let fast = FastLoop::new(first, settings)?.in_real_time();
         let mut slow_steps = Vec::with_capacity(settings.n_ticks);
         let mut last_target = start;
         let solve = |tick: u64, target: &DPose3, handed: &mut Handed| {

@@ -1,6 +1,8 @@
 //! One tick of the loop where the engine runs beside it: the frozen problem solved for the newest target, what
 //! hand-overs changed faded, and a stale answer faded out.
 
+use std::time::{Duration, Instant};
+
 use device::{DeviceError, Watchdog, Wrench};
 use glamx::DPose3;
 
@@ -72,6 +74,8 @@ pub struct FastLoop {
     watchdog: Watchdog,
     period_s: f64,
     last_force: f64,
+    /// Of a period, what a tick may take before it ends with the best answer found; `None`: no clock is read.
+    share: Option<f64>,
     log: FastLog,
 }
 
@@ -87,11 +91,23 @@ impl FastLoop {
             watchdog: Watchdog::new(STALE_S, FADE_OUT_S)?,
             period_s: settings.period_s,
             last_force: 0.0,
+            share: None,
             log: FastLog {
                 hand_overs: Vec::with_capacity(settings.n_ticks),
                 ..FastLog::default()
             },
         })
+    }
+
+    /// Where the clock is real: a tick is over in half a period, whatever answer there is then.
+    #[must_use]
+    pub fn in_real_time(self) -> Self {
+        /// The rest is for the device, and for what the bound does not hold: gaps, and the last step of the solver.
+        const SHARE: f64 = 0.5;
+        Self {
+            share: Some(SHARE),
+            ..self
+        }
     }
 
     /// Contacts of the last answer.
@@ -111,7 +127,7 @@ impl FastLoop {
 
     /// Answers a target. `arrived`: a new problem, if one came. `on_handle`: the wrench on the handle of an answer.
     ///
-    /// Does not allocate, lock, log or block, and reads no clock.
+    /// Does not allocate, lock, log or block, and reads no clock but [in real time](Self::in_real_time).
     pub fn tick(
         &mut self,
         tick: u64,
@@ -119,7 +135,15 @@ impl FastLoop {
         arrived: Option<Box<Handed>>,
         on_handle: impl Fn(&StepReport) -> Wrench,
     ) -> Tick {
-        let spent = arrived.map(|new| self.hand_over(tick, target, new, &on_handle));
+        let deadline = self
+            .share
+            .map(|share| Instant::now() + Duration::from_secs_f64(share * self.period_s));
+        let spent = arrived.map(|mut new| {
+            new.problem.answer_by(deadline);
+            self.handed.problem.answer_by(deadline);
+            self.hand_over(tick, target, new, &on_handle)
+        });
+        self.handed.problem.answer_by(deadline);
         let staleness = self.age(tick);
         let gain = self.gain(tick);
         let prediction = self.handed.problem.solve(target);

@@ -9,6 +9,9 @@ const FALL: f64 = 0.5;
 /// N: below, nothing is felt (a device renders steps of some 0.2 N).
 const LEAST: f64 = 0.05;
 
+/// Of the largest force so far, a peak that is worth the name.
+const SHARE: f64 = 0.3;
+
 /// m, by how much the body has gone on while the force fell.
 const ONWARD: f64 = 2e-5;
 
@@ -78,7 +81,12 @@ impl SnapWatch {
         let sign = rise.peak.signum();
         let has_fallen = sign * resistance < (1.0 - FALL) * rise.peak.abs();
         let goes_on = sign * (travel - rise.at) > ONWARD;
-        let counts = !rise.is_over && rise.peak.abs() > LEAST;
+        let largest = if sign > 0.0 {
+            self.peak_force
+        } else {
+            self.peak_retention
+        };
+        let counts = !rise.is_over && rise.peak.abs() > LEAST.max(SHARE * largest);
         if counts && has_fallen && goes_on {
             rise.is_over = true;
             let passed = SnapPeak {

@@ -140,6 +140,10 @@ impl Ready {
             servo: ServoSettings::live(&limits)?,
             session,
         };
+        if first.is_in_world {
+            // A scripted hand cannot be hurt, and does not wait.
+            spec.servo.safety.arming = None;
+        }
         if first.is_rate {
             // What a motor shakes does no work on the hand.
             spec.servo.safety.passivity = None;

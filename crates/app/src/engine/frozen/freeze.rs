@@ -27,6 +27,7 @@ impl Engine {
         let n = self.part.n_candidates();
         let identity = DPose3::IDENTITY;
         FrozenProblem {
+            deadline: None,
             step: StepReport::at(&identity),
             target: identity,
             reference: DVec3::ZERO,
@@ -65,6 +66,7 @@ impl Engine {
         if let Some(coulomb) = self.law.coulomb_mut() {
             coulomb.end_step();
         }
+        problem.answer_by(None);
         problem.step = *report;
         problem.target = target;
         problem.reference = self.reference;

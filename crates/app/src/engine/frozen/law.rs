@@ -3,6 +3,8 @@
 mod coulomb;
 mod frictionless;
 
+use std::time::Instant;
+
 use contact::Contact;
 use contact::delassus::{ComplianceBlocks, CouplingCompliance};
 use glam::DVec3;
@@ -85,10 +87,11 @@ impl Law {
         contacts: &[Contact],
         forces: &mut ByContact,
         report: &mut StepReport,
+        deadline: Option<Instant>,
     ) {
         match self {
             Self::Frictionless(law) => law.solve(contacts, forces, report),
-            Self::Coulomb(law) => law.solve(forces, report),
+            Self::Coulomb(law) => law.solve(forces, report, deadline),
         }
     }
 }

@@ -258,7 +258,8 @@ impl Coulomb {
         let (q, force) = (&q[..n], &mut force[..n]);
         let problem = Problem::trusted_symmetric(&w_matrix[..n * n], q, &coefficients[..m]);
         let motion = &mut motion[..n];
-        solve_cones(problem, scratch, is_warm, force, motion, report);
+        let settings = Settings::default();
+        solve_cones(problem, &settings, scratch, is_warm, force, motion, report);
         self.spread(rows, places, report);
     }
 
@@ -322,15 +323,15 @@ impl Coulomb {
 /// Forces and motions of rows of three, and what the report says of them.
 pub(in super::super) fn solve_cones(
     problem: Result<Problem<'_>, contact::Error>,
+    settings: &Settings,
     scratch: &mut Scratch,
     is_warm: bool,
     force: &mut [f64],
     motion: &mut [f64],
     report: &mut StepReport,
 ) {
-    let settings = Settings::default();
     let solution =
-        problem.and_then(|problem| solve(&problem, &settings, scratch, is_warm, force, motion));
+        problem.and_then(|problem| solve(&problem, settings, scratch, is_warm, force, motion));
     match solution {
         Ok(solution) => {
             report.pivots += (solution.sweeps + solution.newton_steps) as u32;

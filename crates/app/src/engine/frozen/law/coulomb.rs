@@ -6,11 +6,13 @@
 //! λ: forces of the last answer along the frames as they are now; x and X: where it has the place and the tool, x⁰ and X⁰:
 //! where they were when the tick began. Where planes are kept, q_t = -(W λ⁰)_t - h_t·(motion of the target in the tick).
 
+use std::time::Instant;
+
 use contact::Contact;
 use contact::delassus::{
     ComplianceBlocks, CouplingCompliance, Frame, delassus_frames_into, frame, frame_along,
 };
-use contact::friction::{Problem, Scratch, State};
+use contact::friction::{Problem, Scratch, Settings, State};
 use glam::DVec3;
 use glamx::DPose3;
 
@@ -130,7 +132,12 @@ impl Coulomb {
         }
     }
 
-    pub(super) fn solve(&mut self, forces: &mut ByContact, report: &mut StepReport) {
+    pub(super) fn solve(
+        &mut self,
+        forces: &mut ByContact,
+        report: &mut StepReport,
+        deadline: Option<Instant>,
+    ) {
         let m = self.frames.len();
         let n = 3 * m;
         (report.dissipated, report.sticking) = (0.0, 0);
@@ -142,7 +149,19 @@ impl Coulomb {
         let is_warm = force.iter().any(|force| *force != 0.0);
         let (w, q) = (&self.w_matrix[..n * n], &self.q[..n]);
         let problem = Problem::trusted_symmetric(w, q, &self.coefficients[..m]);
-        solve_cones(problem, &mut self.scratch, is_warm, force, motion, report);
+        let settings = Settings {
+            deadline,
+            ..Settings::default()
+        };
+        solve_cones(
+            problem,
+            &settings,
+            &mut self.scratch,
+            is_warm,
+            force,
+            motion,
+            report,
+        );
         let states = self.scratch.states();
         let of_rows = force.chunks_exact(3).zip(motion.chunks_exact(3));
         for (row, ((force, motion), frame)) in of_rows.zip(&self.frames).enumerate() {
